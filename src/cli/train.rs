@@ -55,9 +55,10 @@ pub(super) struct Train {
     /// that the images allow.
     #[arg(long, value_name = "WHERE", default_value = "auto", value_parser = values::one_of(&Start::NAMES))]
     start: Start,
-    /// Temporal scale of Gaussians at the beginning, as a share of the time interval; the original's is 0.447 of an interval of 1.
-    #[arg(long, value_name = "SHARE", default_value = "0.1", value_parser = time_scale)]
-    time_scale: f64,
+    /// Temporal scale of Gaussians at the beginning, as a share of the time interval [default: 0.1, at least the step between two moments
+    /// of the images; the original's is 0.447 of an interval of 1].
+    #[arg(long, value_name = "SHARE", value_parser = time_scale)]
+    time_scale: Option<f64>,
     /// Spatial degree of color, 0 to 3.
     #[arg(long, value_name = "DEGREE", default_value = "3", value_parser = clap::value_parser!(u32).range(0..=3))]
     sh_degree: u32,

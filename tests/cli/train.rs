@@ -41,7 +41,7 @@ fn a_capture_is_trained_from_the_pictures_of_a_dataset() {
     let curve = json["curve"].as_array().expect("a curve");
     let (first, best) = (curve[0]["psnr"].as_f64().expect("a number"), json["psnr"].as_f64().expect("a number"));
     assert!(
-        curve.len() == 4 && first < 12.0 && best > 18.0,
+        curve.len() == 4 && best - first > 5.0 && best > 18.0,
         "training raises the PSNR of the camera held out from {first:.2} to {best:.2} dB, 18 expected"
     );
     assert_eq!(folders::names(capture.folder.path()), ["data", "out.gs4d"], "no state is left");

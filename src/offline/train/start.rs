@@ -22,6 +22,8 @@ use glam::Vec3;
 
 /// Opacity before the first step.
 const OPACITY: f32 = 0.1;
+/// Temporal scale, as a share of the interval, unless moments are further apart.
+const USUAL_TIME_SCALE: f64 = 0.1;
 /// Least squared scale.
 const LEAST_SQUARE: f32 = 1e-7;
 /// Nearest points that give the scale.
@@ -57,15 +59,16 @@ impl Start {
     }
 }
 
-/// How a capture begins. Default: 60,000 Gaussians with a temporal scale of a tenth of the interval, colors of degree 3, and degree 2 in time.
+/// How a capture begins. Default: 60,000 Gaussians with the usual temporal scale, colors of degree 3, and degree 2 in time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StartSettings {
     /// Number of Gaussians, which stays.
     pub gaussians: usize,
     /// Where their points come from.
     pub start: Start,
-    /// Temporal scale, as a share of the interval. The original's is `√(T/5)` for an interval of length `T`.
-    pub time_scale: f64,
+    /// Temporal scale, as a share of the interval; `None`: a tenth, and at least the mean step between two moments of the images. The
+    /// original's is `√(T/5)` for an interval of length `T`.
+    pub time_scale: Option<f64>,
     /// Seed of the random numbers.
     pub seed: u64,
     /// Spatial degree of color, 0 to 3.
@@ -76,7 +79,7 @@ pub struct StartSettings {
 
 impl Default for StartSettings {
     fn default() -> Self {
-        Self { gaussians: 60_000, start: Start::Auto, time_scale: 0.1, seed: 0, degree: 3, degree_t: 2 }
+        Self { gaussians: 60_000, start: Start::Auto, time_scale: None, seed: 0, degree: 3, degree_t: 2 }
     }
 }
 
@@ -94,7 +97,8 @@ pub fn begin(
     let region = Region::of(pairs.iter().map(|(view, _)| *view))?;
     let (points, start) = points(&pairs, &region, trained_with.time_interval, settings)?;
     let span = trained_with.time_span();
-    let scale_t = settings.time_scale as f32 * span;
+    let usual = || usual_time_scale(pairs.iter().map(|(view, _)| view.time).collect());
+    let scale_t = settings.time_scale.unwrap_or_else(usual) as f32 * span;
     let (degree, degree_t) = (settings.degree.min(3), if settings.degree >= 3 { settings.degree_t.min(2) } else { 0 });
     let scene = GaussianScene {
         form: SceneForm::Trained(trained(&points, scale_t, degree, degree_t)),
@@ -105,6 +109,14 @@ pub fn begin(
         levels: Vec::new(),
     };
     Ok((scene, start))
+}
+
+/// Returns the usual temporal scale for images of these times, as a share of the interval.
+fn usual_time_scale(mut times: Vec<f32>) -> f64 {
+    times.sort_by(f32::total_cmp);
+    times.dedup();
+    let step = 1.0 / (times.len() as f64 - 1.0).max(1.0);
+    step.max(USUAL_TIME_SCALE)
 }
 
 fn points(
@@ -204,6 +216,13 @@ mod tests {
         let images: Vec<_> = views.iter().map(|(view, image)| (view, image)).collect();
         let region = Region::of(images.iter().map(|(view, _)| *view)).expect("a region");
         points(&images, &region, [0.0, 0.8], &StartSettings { gaussians: 700, start, ..StartSettings::default() })
+    }
+
+    #[test]
+    fn the_usual_temporal_scale_reaches_the_next_moment() {
+        let scale = |moments: u16| usual_time_scale((0..3 * moments).map(|time| f32::from(time % moments)).collect());
+        assert_eq!([1, 2, 5].map(scale), [1.0, 1.0, 0.25], "a step between moments, however many cameras see each");
+        assert_eq!([11, 100].map(scale), [0.1; 2], "at least a tenth of the interval");
     }
 
     #[test]
