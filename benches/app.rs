@@ -53,7 +53,7 @@ fn main() -> Result {
             continue;
         }
         for msaa in [Msaa::Off, Msaa::Sample4] {
-            for design in [None, Some(Design::Reference), Some(Design::Fast)] {
+            for design in [None, Some(Design::GlobalSort), Some(Design::TileBins)] {
                 apps.push(app(&arguments, eye, adjust, !apps.is_empty(), msaa, design)?);
                 subjects.push(Subject { plugins, samples: msaa.samples(), design });
             }

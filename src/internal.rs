@@ -79,7 +79,7 @@ pub mod codec {
 /// Of `renderer`.
 #[cfg(feature = "renderer")]
 pub mod renderer {
-    pub use crate::renderer::view::{FinishedFrame, PassBuffers};
+    pub use crate::renderer::global_sort::{FinishedFrame, PassBuffers};
 
     /// Pipelines and bind groups.
     pub mod bind {
@@ -97,12 +97,29 @@ pub mod renderer {
     pub mod shaders {
         pub use crate::renderer::shaders::*;
     }
+    /// Variants of the passes of the global sort.
+    pub mod global_sort {
+        pub use crate::renderer::global_sort::AtOnce;
+    }
+    /// Variants of the passes of tile bins.
+    pub mod tile_bins {
+        pub use crate::renderer::tile_bins::{Blending, EIGHT_AT_ONCE, FEW_BINS, LARGE_BATCHES, Lists};
+    }
 }
 
 /// Of `offline`.
 #[cfg(feature = "offline")]
 pub mod offline {
     pub use crate::offline::sliced::*;
+
+    /// The layouts that shaders and Rust share.
+    pub mod layout {
+        pub use crate::offline::layout::*;
+    }
+    /// The composed shaders.
+    pub mod shaders {
+        pub use crate::offline::shaders::*;
+    }
 
     /// Checks whether images show a capture.
     pub mod belonging {

@@ -47,7 +47,12 @@
 //!                ▼ once for all cameras     │
 //!     renderer: activate ─▶ ActiveList ────▶│
 //!                                           ▼
-//!          renderer: one compute pass
+//!          renderer: one compute pass, of tile bins
+//!          ┌────────────────────────────────────────────────────────────┐
+//!          │ project_bin ────▶ sort_bins, colors ────▶ blend_blocks     │
+//!          │ splats, in bins   lists of tiles          color, depth     │
+//!          └────────────────────────────────────────────────────────────┘
+//!          or, on software drivers and in browsers, of the global sort
 //!          ┌────────────────────────────────────────────────────────────┐
 //!          │ project ─▶ sort ─▶ bin ─▶ sort ─▶ ranges ─▶ blend          │
 //!          │ splats     depth   pairs  tile    of tiles  color, depth   │
@@ -67,8 +72,9 @@
 //!    camera has drawn so far; it, `write_depth` and `write_motion` are the passes in Bevy's pipeline cache.
 //! 4. [`renderer::Headless`] returns the result as a [`Frame`](view::Frame) instead. The `gs4d` command and the tests use it.
 //!
-//! Each pass from `activate` to `blend`, and `motion` after it, has one name everywhere: `shaders/project.wgsl`, the function in
-//! [`mod@reference`], the timestamp span (`sort` has two: by depth, by tile), the tests. Rules that several passes share are a file each, in `shaders/shared/` and in
+//! Each pass has one name everywhere: its shader (`shaders/tile_bins/project_bin.wgsl`), its pipeline and its recording
+//! (`src/renderer/tile_bins/`), its timestamp span (`sort` has two: by depth, by tile), its tests. The function in [`mod@reference`] is that of the
+//! global sort, whose pictures tile bins draw too. Rules that several passes share are a file each, in `shaders/shared/` and in
 //! [`gaussian`]: which tiles a splat covers (`gaussian::overlap`), what it does to a pixel (`gaussian::alpha`).
 //!
 //! # The rings

@@ -1,4 +1,4 @@
-// Entries of the bins of the fast design: a depth key, and a word with the slot of a splat and the tiles of the bin that it covers.
+// Entries of tile bins: a depth key, and a word with the slot of a splat and the tiles of the bin that it covers.
 #define_import_path gs4d::bins
 
 // Bits of the slot in the second word of an entry. The other eight are the first and last column and row of the bin's tiles that

@@ -49,7 +49,7 @@ fn read_splat(record: SplatRecord) -> Splat {
     return splat_of(record.place, bitcast<vec3<f32>>(record.shape.xyz), bitcast<vec3<f32>>(record.color.xyz));
 }
 
-// Returns a splat of the fast design, which stores colors in a separate buffer.
+// Returns a splat of tile bins, which stores colors in a separate buffer.
 fn read_shape(shape: SplatShape, color: vec3<f32>) -> Splat {
     return splat_of(shape.place, shape.conic.xyz, color);
 }

@@ -38,8 +38,8 @@ fn contributing_tiles(
 }
 
 // Returns the words `low` and `high` of a rectangle.
-fn pack_tiles(tiles: vec4<f32>) -> vec2<u32> {
-    return vec2(u32(tiles.x) | (u32(tiles.y) << 16u), u32(tiles.z) | (u32(tiles.w) << 16u));
+fn pack_tiles(tiles: vec4<u32>) -> vec2<u32> {
+    return tiles.xz | (tiles.yw << vec2(16u));
 }
 
 // Returns the number of columns of a rectangle.

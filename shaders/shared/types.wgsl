@@ -14,126 +14,6 @@ struct GaussianRecord {
     covariance_b: vec4<f32>,
 }
 
-// The raw parameters of one Gaussian, or their gradients. Quaternions are (w, x, y, z).
-struct TrainedRecord {
-    // Mean, mean_t.
-    mean: vec4<f32>,
-    // Logarithms of the scales; w: of the temporal scale.
-    log_scale: vec4<f32>,
-    rotation_l: vec4<f32>,
-    rotation_r: vec4<f32>,
-    // Logit of opacity; three unused.
-    opacity_logit: vec4<f32>,
-}
-
-// The change that packing makes to one Gaussian. Input of `rounding`.
-struct RoundingRecord {
-    // Added to the mean and to mean_t.
-    mean: vec4<f32>,
-    // Added to the velocity; w: factor on inverse_sigma_t.
-    velocity: vec4<f32>,
-    // Columns of the matrix that transforms the covariance. w: added to the variances before that.
-    shape_x: vec4<f32>,
-    // w: added to the opacity.
-    shape_y: vec4<f32>,
-    // w: unused.
-    shape_z: vec4<f32>,
-}
-
-// Settings of the trained scene, and the number of a view.
-struct TrainedScene {
-    count: u32,
-    // 0: static, 1: without 4D rotation, 2: with it.
-    model: u32,
-    // Added to the temporal variance in the marginal, if positive.
-    prefilter_var: f32,
-    view: u32,
-}
-
-// Input of `loss` for one view.
-struct LossUniforms {
-    // Background color behind the image where its coverage is below 1.
-    background: vec4<f32>,
-    size: vec2<u32>,
-    tiles: vec2<u32>,
-    // Weight of the view in the loss of the batch.
-    share: f32,
-    // Weight of SSIM in the loss of the view, from 0 to 1.
-    similarity_share: f32,
-    // Weight of the opacity mask.
-    mask_weight: f32,
-    padding: u32,
-}
-
-// Input of `codebooks`.
-struct TiedColors {
-    // Number of Gaussians.
-    count: u32,
-    // Four-vectors of each Gaussian and of each entry.
-    stride: u32,
-    // Number of codebooks.
-    stages: u32,
-    padding: u32,
-}
-
-// Input of `adam` for one buffer.
-struct AdamUniforms {
-    // Learning rates of the first four four-vectors of each Gaussian, and of all others.
-    rates: array<vec4<f32>, 5>,
-    // 1 / (1 - decay^step) of the first moment, and the square root of this value of the second moment.
-    correction: vec2<f32>,
-    count: u32,
-    // Four-vectors of each Gaussian.
-    stride: u32,
-    // 1: only Gaussians that are visible in a view of the batch are updated.
-    sparse: u32,
-    // Number of values of each Gaussian that are updated.
-    values: u32,
-    padding: vec2<u32>,
-}
-
-// Input of `regularize`: the weights of its terms for each Gaussian.
-struct TermWeights {
-    // Weight of the length of its velocity.
-    motion: f32,
-    // Weight of the length of the difference between its velocity and the velocity of a neighbor at the same position.
-    rigid: f32,
-    // Weight of its opacity.
-    opacity: f32,
-    // Weight of each of its spatial scales.
-    scale: f32,
-}
-
-// Input of `noise` for one step.
-struct NoiseUniforms {
-    count: u32,
-    // Seed of the step.
-    seed: u32,
-    // Factor on the variance along an axis that gives the deviation of the noise of a fully transparent Gaussian along it.
-    strength: f32,
-    // Least logarithm of the temporal scale.
-    least_log_scale_t: f32,
-}
-
-// Input of `dropout` for one step.
-struct DropoutUniforms {
-    count: u32,
-    // Seed of the step.
-    seed: u32,
-    // Gaussians whose random word is below this number are hidden.
-    below: u32,
-    padding: u32,
-}
-
-// Input of `relocate`.
-struct RelocationUniforms {
-    // Number of moves.
-    moves: u32,
-    // Four-vectors of the color of each Gaussian.
-    stride: u32,
-    padding: vec2<u32>,
-}
-
 // One part of a capture in one view: its camera and the slots of its splats.
 struct InstanceUniforms {
     // Rows of capture-to-camera.
@@ -180,7 +60,7 @@ struct InstanceUniforms {
     cropped: u32,
     // Gaussians per thread of `project_bin`.
     per_thread: u32,
-    // Fast design. x: tiles along each side of a bin (8 bits) and frame number; y: capacity of a bin in splats; z: index of this part;
+    // Tile bins. x: tiles along each side of a bin (8 bits) and frame number; y: capacity of a bin in splats; z: index of this part;
     // w: number of parts.
     binning: vec4<u32>,
     // Screen-space variances of one training pixel squared, at one pixel per camera unit.
@@ -280,7 +160,7 @@ struct SplatRecord {
     color: vec4<u32>,
 }
 
-// A splat of the fast design, without its color. See records.wgsl.
+// A splat of tile bins, without its color. See records.wgsl.
 struct SplatShape {
     // Center, opacity, depth.
     place: vec4<f32>,
@@ -288,7 +168,7 @@ struct SplatShape {
     conic: vec4<f32>,
 }
 
-// Further data of a visible splat in the fast design.
+// Further data of a visible splat of tile bins.
 struct VisibleSplat {
     // Viewing direction, or color in some debug views; time from the frame to the temporal mean.
     seen: vec4<f32>,
@@ -320,6 +200,6 @@ const SORT_SLOTS: u32 = 0u;
 const SORT_VISIBLE: u32 = 1u;
 const SORT_PAIRS: u32 = 2u;
 
-// Number of counters of the fast design before the counters of parts and bins: pairs of this frame, modulo 2^32, and how often this number
+// Number of counters of tile bins before the counters of parts and bins: pairs of this frame, modulo 2^32, and how often this number
 // has wrapped; then visible splats, pairs, splats of the fullest bin and pairs written of the previous frame.
 const BIN_COUNTERS: u32 = 6u;

@@ -30,7 +30,7 @@ use std::path::{Path, PathBuf};
 Examples:
   gs4d bench capture.gs4d
   gs4d bench chkpnt30000.pth --cameras data/transforms_test.json --resolution 2 --times 5
-  gs4d bench a.gs4d b.gs4d --renderer fast,reference --form stored,fp32 --filter on,off --rounds 3
+  gs4d bench a.gs4d b.gs4d --renderer bins,sort --form stored,fp32 --filter on,off --rounds 3
   gs4d bench capture.gs4d --orbit 24 --size 1352x1014 --frames 1000 --json")]
 pub(super) struct Bench {
     /// The packages or checkpoints to draw.

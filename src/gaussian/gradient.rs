@@ -1,5 +1,5 @@
 //! The gradient of a Gaussian: from its splat back to its raw parameters. The CPU reference of
-//! `shaders/project_backward.wgsl`.
+//! `shaders/offline/project_backward.wgsl`.
 //!
 //! In: the raw [`Parameters`] and [`Harmonics`] of one Gaussian, a [`View`], and the gradient of a loss with respect
 //! to its splat ([`SplatGradient`]). Out: the gradient with respect to each raw parameter ([`ParameterGradient`]), in

@@ -1,7 +1,7 @@
 //! Projection: from a Gaussian at a time to a splat on the screen (EWA splatting, as the original rasterizer does it).
 //!
 //! In: a [`Gaussian`] and a [`View`]. Out: [`Projected`]; `None` if the Gaussian is not drawn. The steps and their
-//! order are those of the original rasterizer, and of `shaders/project.wgsl`; for thin and for very large splats see [`conic`](super::conic).
+//! order are those of the original rasterizer, and of `shaders/global_sort/project.wgsl`; for thin and for very large splats see [`conic`](super::conic).
 
 use super::conic::{LOW_PASS, ScreenCovariance};
 use super::lifespan::MARGINAL_CUTOFF;

@@ -21,6 +21,7 @@
 //! | [`bake`](mod@bake), [`report`] | runs all steps in order, resumable, and writes a report |
 //! | [`metrics`], `evaluation`, `fidelity`, `comparison` | measures how close pictures are |
 //! | [`ablation`] | tabulates the loss by every score, ratio and filter |
+//! | `shaders`, `layout` | compose the passes of scoring and training, and mirror their structures |
 //! | `files` | refuses outputs that are inputs or cannot be written, before anything is computed |
 //! | `stages`, `store`, `stored` | run stages and keep their results, from which interrupted work resumes |
 //! | `unfinished` | lists the files and folders that are removed if a process ends before its work |
@@ -39,6 +40,7 @@ pub(crate) mod evaluation;
 pub(crate) mod fidelity;
 pub(crate) mod files;
 pub mod fine_tune;
+pub(crate) mod layout;
 pub(crate) mod memory_check;
 pub mod metrics;
 pub mod orbit;
@@ -54,6 +56,7 @@ pub mod report;
 mod save;
 pub mod score;
 pub(crate) mod search;
+pub(crate) mod shaders;
 pub(crate) mod sliced;
 pub(crate) mod splits;
 pub(crate) mod stages;

@@ -1,5 +1,5 @@
 //! `blend_backward`: the gradient of a loss on a view, back from its pixels to its splats, and on to the raw parameters
-//! of a trained scene; CPU reference of `shaders/blend_backward.wgsl`.
+//! of a trained scene; CPU reference of `shaders/offline/blend_backward.wgsl`.
 //!
 //! In: splats and their lists by tile, the background, and the gradient with respect to every pixel. Out: one
 //! [`SplatGradient`] for each splat; for a scene in the trained form, one [`ParameterGradient`] for each Gaussian.

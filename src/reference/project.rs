@@ -1,4 +1,4 @@
-//! `project`: Gaussians to splats; CPU reference of `shaders/project.wgsl`.
+//! `project`: Gaussians to splats; CPU reference of `shaders/global_sort/project.wgsl`.
 //!
 //! In: a [`Layer`] and the blend space. Out: one [`Splat`] for each Gaussian, invisible if it is not drawn.
 

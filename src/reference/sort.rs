@@ -1,4 +1,4 @@
-//! `sort`: a stable sort by an unsigned key; CPU reference of `shaders/sort.wgsl`.
+//! `sort`: a stable sort by an unsigned key; CPU reference of `shaders/global_sort/sort.wgsl`.
 //!
 //! In: items and their key. Out: the items in order; items of equal keys keep their order, so that equal
 //! depths stay in the order of the Gaussians.

@@ -4,25 +4,26 @@
 //! is tried once: views go on with the variants they have.
 
 use super::passes::Passes;
-use super::shaders::{FastVariant, Storage};
+use super::shaders::Storage;
+use super::tile_bins::BinVariant;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 
-/// Passes of the fast design: the captures that are drawn, and the variant.
-type Wanted = (Vec<(Storage, bool)>, FastVariant);
+/// Passes of tile bins: the captures that are drawn, and the variant.
+type Wanted = (Vec<(Storage, bool)>, BinVariant);
 
 /// The variants whose compilation has begun.
 #[derive(Debug, Default)]
 pub(super) struct Compiling(Mutex<Vec<Wanted>>);
 
 impl Compiling {
-    /// Begins to compile the passes of the fast design for these storages, unless this has begun before.
+    /// Begins to compile the passes of tile bins for these storages, unless this has begun before.
     pub(super) fn begin(
         &self,
         passes: &Arc<Passes>,
         device: &wgpu::Device,
         drawn: Vec<(Storage, bool)>,
-        variant: FastVariant,
+        variant: BinVariant,
     ) {
         let mut begun = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let wanted = (drawn, variant);
@@ -30,7 +31,7 @@ impl Compiling {
             return;
         }
         let (passes, device, drawn) = (Arc::clone(passes), device.clone(), wanted.0.clone());
-        let compile = move || passes.compile_fast(&device, drawn.into_iter(), variant);
+        let compile = move || passes.tile_bins.compile(&device, drawn.into_iter(), variant);
         let _ = self.thread(move || drop(compile()));
         begun.push(wanted);
     }

@@ -32,7 +32,7 @@ impl GpuContext {
             .map_err(|error| GpuError::NoAdapter { reason: error.to_string() })?,
         };
         let info = adapter.get_info();
-        // Timestamps are for benchmarks, subgroups for the fast design, float atomics for training. All are optional.
+        // Timestamps are for benchmarks, subgroups for tile bins, float atomics for training. All are optional.
         let timestamps = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES;
         let wanted_features = timestamps | wgpu::Features::SUBGROUP | wgpu::Features::SHADER_FLOAT32_ATOMIC;
         let (device, queue) = block_on(adapter.request_device(&wgpu::DeviceDescriptor {

@@ -17,167 +17,6 @@ pub const DIGITS: u32 = 1 << DIGIT_BITS;
 /// Number of steps that sort 32-bit depths.
 pub const DEPTH_STEPS: u32 = 32 / DIGIT_BITS;
 
-/// The raw parameters of one Gaussian, or their gradients. Quaternions are (w, x, y, z).
-#[repr(C)]
-#[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
-pub struct TrainedRecord {
-    /// Mean.
-    pub mean: [f32; 3],
-    /// Temporal mean.
-    pub mean_t: f32,
-    /// Logarithms of the scales.
-    pub log_scale: [f32; 3],
-    /// Logarithm of the temporal scale.
-    pub log_scale_t: f32,
-    /// Left rotation.
-    pub rotation_l: [f32; 4],
-    /// Right rotation.
-    pub rotation_r: [f32; 4],
-    /// Logit of opacity; three unused.
-    pub opacity_logit: [f32; 4],
-}
-
-/// The change that packing makes to one Gaussian. Input of `rounding`.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-pub struct RoundingRecord {
-    /// Offset of the mean and of the temporal mean.
-    pub mean: [f32; 4],
-    /// Offset of the velocity; factor on the reciprocal of the temporal deviation.
-    pub velocity: [f32; 4],
-    /// Column x of the matrix that transforms the covariance; offset of the variances before that.
-    pub shape_x: [f32; 4],
-    /// Column y; offset of the opacity.
-    pub shape_y: [f32; 4],
-    /// Column z; one unused.
-    pub shape_z: [f32; 4],
-}
-
-/// Settings of the trained scene, and the number of a view.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-pub struct TrainedScene {
-    /// Number of Gaussians.
-    pub count: u32,
-    /// 0: static, 1: without 4D rotation, 2: with it.
-    pub model: u32,
-    /// Added to the temporal variance in the marginal, if positive.
-    pub prefilter_var: f32,
-    /// Number of the view.
-    pub view: u32,
-}
-
-/// Input of `loss` for one view.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-pub struct LossUniforms {
-    /// Background color behind the image where its coverage is below 1.
-    pub background: [f32; 4],
-    /// Picture size, pixels.
-    pub size: [u32; 2],
-    /// Tiles across and down.
-    pub tiles: [u32; 2],
-    /// Weight of the view in the loss of the batch.
-    pub share: f32,
-    /// Weight of SSIM in the loss of the view, from 0 to 1.
-    pub similarity_share: f32,
-    /// Weight of the opacity mask.
-    pub mask_weight: f32,
-    /// Unused.
-    pub padding: u32,
-}
-
-/// Input of `codebooks`.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-pub struct TiedColors {
-    /// Number of Gaussians.
-    pub count: u32,
-    /// Four-vectors of each Gaussian and of each entry.
-    pub stride: u32,
-    /// Number of codebooks.
-    pub stages: u32,
-    /// Unused.
-    pub padding: u32,
-}
-
-/// Input of `adam` for one buffer.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-pub struct AdamUniforms {
-    /// Learning rates of the first four four-vectors of each Gaussian, and of all others.
-    pub rates: [[f32; 4]; 5],
-    /// `1 / (1 - decay^step)` of the first moment, and the square root of this value of the second moment.
-    pub correction: [f32; 2],
-    /// Number of Gaussians.
-    pub count: u32,
-    /// Four-vectors of each Gaussian.
-    pub stride: u32,
-    /// 1: only Gaussians that are visible in a view of the batch are updated.
-    pub sparse: u32,
-    /// Number of values of each Gaussian that are updated; the values after these keep their value.
-    pub values: u32,
-    /// Unused.
-    pub padding: [u32; 2],
-}
-
-/// Index of the first Gaussian in the `notes` of `project_backward`, after three words about gradients that are not finite.
-pub const FIRST_SEEN: u32 = 3;
-
-/// Input of `regularize`: the weights of its terms for each Gaussian.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-pub struct TermWeights {
-    /// Weight of the length of its velocity.
-    pub motion: f32,
-    /// Weight of the length of the difference between its velocity and the velocity of a neighbor at the same position.
-    pub rigid: f32,
-    /// Weight of its opacity.
-    pub opacity: f32,
-    /// Weight of each of its spatial scales.
-    pub scale: f32,
-}
-
-/// Input of `noise` for one step.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-pub struct NoiseUniforms {
-    /// Number of Gaussians.
-    pub count: u32,
-    /// Seed of the step.
-    pub seed: u32,
-    /// Factor on the variance along an axis that gives the deviation of the noise of a fully transparent Gaussian along it.
-    pub strength: f32,
-    /// Least logarithm of the temporal scale.
-    pub least_log_scale_t: f32,
-}
-
-/// Input of `dropout` for one step.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-pub struct DropoutUniforms {
-    /// Number of Gaussians.
-    pub count: u32,
-    /// Seed of the step.
-    pub seed: u32,
-    /// Gaussians whose random word is below this number are hidden.
-    pub below: u32,
-    /// Unused.
-    pub padding: u32,
-}
-
-/// Input of `relocate`.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-pub struct RelocationUniforms {
-    /// Number of moves.
-    pub moves: u32,
-    /// Four-vectors of the color of each Gaussian.
-    pub stride: u32,
-    /// Unused.
-    pub padding: [u32; 2],
-}
-
 /// Stride in bytes of the uniforms of instances, which are bound at dynamic offsets or as an array (`InstanceSlot` of the shaders), and of
 /// [`MotionUniforms`], [`SortStep`]s and [`Activation`]s. A multiple of the alignment of every device.
 pub const INSTANCE_STRIDE: u32 = 512;
@@ -257,7 +96,7 @@ pub struct InstanceUniforms {
     pub cropped: u32,
     /// Gaussians per thread of `project_bin`.
     pub per_thread: u32,
-    /// Fast design: tiles along each side of a bin (8 bits) and frame number; capacity of a bin in splats; index of this part; number of
+    /// Tile bins: tiles along each side of a bin (8 bits) and frame number; capacity of a bin in splats; index of this part; number of
     /// parts.
     pub binning: [u32; 4],
     /// Screen-space variances of one training pixel squared, at one pixel per camera unit.
@@ -472,7 +311,7 @@ pub struct SplatRecord {
     pub tiles_high: u32,
 }
 
-/// A splat of the fast design, without its color.
+/// A splat of tile bins, without its color.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct SplatShape {
@@ -482,7 +321,7 @@ pub struct SplatShape {
     pub conic: [f32; 4],
 }
 
-/// Further data of a visible splat in the fast design.
+/// Further data of a visible splat of tile bins.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct VisibleSplat {
@@ -498,9 +337,9 @@ pub struct VisibleSplat {
 pub struct Counters {
     /// Number of visible splats.
     pub visible: u32,
-    /// Reference design: number of pairs written. Fast design: number of pairs of the frame, written or not.
+    /// Global sort: number of pairs written. Tile bins: number of pairs of the frame, written or not.
     pub pairs: u32,
-    /// Reference design: number of pairs of the frame, written or not. Fast design: number of splats in the fullest bin.
+    /// Global sort: number of pairs of the frame, written or not. Tile bins: number of splats in the fullest bin.
     pub pairs_wanted: u32,
     /// Unused.
     pub padding: u32,
@@ -527,6 +366,6 @@ pub const SORT_VISIBLE: u32 = 1;
 /// Sorts the pairs.
 pub const SORT_PAIRS: u32 = 2;
 
-/// Number of counters of the fast design before the counters of parts and bins: pairs of this frame, modulo 2³², and how often this number
+/// Number of counters of tile bins before the counters of parts and bins: pairs of this frame, modulo 2³², and how often this number
 /// has wrapped; then the [`Counters`] of the previous frame, the last of which is the number of pairs written.
 pub const BIN_COUNTERS: u32 = 6;

@@ -5,26 +5,15 @@
 //! runs for each placed capture when its segment of time changes ([`ActiveList`]); a frame of a view is one compute
 //! pass whose dispatches are sized on the GPU, without a read-back:
 //!
-//! | pass | reads | writes |
-//! |---|---|---|
-//! | `activate` | temporal filter | list of the active Gaussians |
-//! | `project` | that list, Gaussians, color coefficients | splats, depth keys |
-//! | `sort` (8 steps of 4 bits) | depth keys | order of the visible splats |
-//! | `bin` | splats in order | pairs (tile, splat), their number |
-//! | `sort` (as many steps as tiles need) | pairs | pairs ordered by tile, then depth |
-//! | `ranges` | pairs | first and last pair of each tile |
-//! | `blend` | ranges, pairs, splats, opaque depth | color and transmittance, expected and median depth |
+//! | design | passes |
+//! |---|---|
+//! | tile bins ([`Design::TileBins`]), on GPUs | `project_bin` puts splats into bins of a few tiles, `sort_bins` sorts each bin in workgroup memory, `colors` computes colors, `blend_blocks` blends |
+//! | global sort ([`Design::GlobalSort`]), on software drivers | `project`, `sort` by depth, `bin` into pairs of a tile and a splat, `sort` by tile, `ranges`, `blend` |
 //!
-//! If the views of the previous frame are given, `motion` then replaces the color of each splat by its motion, and `blend` runs once more,
-//! into a target of motions.
-//!
-//! Two stable sorts, first by depth and then by tile, produce the original's order by (tile, depth, index), and move far
-//! less data than a sort by 64-bit keys. No pass needs subgroups, and the results do not depend on the subgroup size.
-//!
-//! These passes are the reference design ([`Design::Reference`]), which has the order of the original. [`Design::Fast`] draws the same picture
-//! in four dispatches: `project_bin` writes splats into unordered bins of a few tiles, `sort_bins` sorts each bin in workgroup memory and
-//! writes the pairs of its tiles, `colors` computes the colors of the visible splats, and `blend_blocks` blends each tile in blocks of 8 x 4
-//! pixels.
+//! Before them `activate` lists the active Gaussians of a capture; after them, if the views of the previous frame are given, `motion` replaces the
+//! color of each splat by its motion, and the last pass runs once more, into a target of motions. All designs draw the same picture. The folders
+//! `global_sort` and `tile_bins` have a design each: variants, pipelines, buffers, recording; `view` chooses the design of a frame, and has what
+//! both need: sizes, uniforms, targets, counters.
 //!
 //! # Buffer capacity
 //!
@@ -35,8 +24,8 @@
 //!
 //! | design | if the capacity is exceeded | last pass |
 //! |---|---|---|
-//! | reference | pairs of the farthest splats are not written | at the end of its list, `blend` continues with all remaining splats in depth order |
-//! | fast | the pairs of whole bins, or the entries of a bin, are not written | `blend_blocks` searches all splats for the nearest splats of a tile |
+//! | global sort | pairs of the farthest splats are not written | at the end of its list, `blend` continues with all remaining splats in depth order |
+//! | tile bins | the pairs of whole bins, or the entries of a bin, are not written | `blend_blocks` searches all splats for the nearest splats of a tile |
 //!
 //! The result is exact, but slow: each tile visits every splat. On a device whose limits are too low for the pairs of a view, every frame is
 //! drawn this way ([`ViewRenderer::is_short_of_room`]). Clients that read the lists of pairs need all pairs: [`Headless::draw`] draws again
@@ -50,24 +39,29 @@
 //! has no such variant, and compiles its passes at once.
 //!
 //! Mesa's software driver ends all loops of a thread after 65,535 iterations. There `blend` blends many splats in an iteration if a view has
-//! many, and frames of the fast design that may exceed the iterations are drawn with the reference design: [`Headless`] draws such a frame
-//! again, other views use the reference design from a number of splats on. Hardware has no such limit.
+//! many, and frames of tile bins that may exceed the iterations are drawn with the global sort: [`Headless`] draws such a frame
+//! again, other views use the global sort from a number of splats on. Hardware has no such limit.
 
 mod active;
 pub(crate) mod bind;
 mod capture;
+mod compiler;
 mod compiling;
 mod design;
 mod device;
 mod error;
+pub(crate) mod global_sort;
 mod headless;
+mod iterations;
 pub(crate) mod layout;
 mod layouts;
 pub(crate) mod memory;
 mod passes;
 mod pipelines;
+mod recording;
 pub(crate) mod shaders;
 mod statistics;
+pub(crate) mod tile_bins;
 mod timing;
 pub(crate) mod view;
 mod work;
@@ -77,11 +71,11 @@ pub use capture::{CaptureUpload, GpuCapture};
 pub use design::Design;
 pub use device::GpuContext;
 pub use error::GpuError;
+pub(crate) use global_sort::FinishedFrame;
 pub use headless::Headless;
 pub use pipelines::Renderer;
 pub use shaders::{ColorPrecision, ShaderChecks, Storage};
 pub use statistics::ViewStatistics;
 pub use timing::{PassTime, Timings};
-pub(crate) use view::FinishedFrame;
 pub use view::{Instance, OpaqueDepth, ViewParameters, ViewRenderer};
 pub use work::WorkCounters;

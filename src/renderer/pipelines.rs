@@ -6,13 +6,17 @@ use super::bind::pipeline;
 use super::compiling::Compiling;
 use super::design::Design;
 use super::error::GpuError;
+use super::global_sort::AtOnce;
 use super::layout::INSTANCES_BOUND;
 use super::layouts::Layouts;
 use super::memory::Allocator;
 use super::passes::Passes;
-use super::shaders::{AtOnce, FastVariant, Lists, Pixels, ShaderChecks, Storage, module};
 #[cfg(feature = "bevy")]
-use super::shaders::{Blending, ColorPrecision};
+use super::shaders::ColorPrecision;
+use super::shaders::{Pixels, SHADERS, ShaderChecks, Storage};
+#[cfg(feature = "bevy")]
+use super::tile_bins::Blending;
+use super::tile_bins::{BinVariant, Lists};
 use super::work::WorkCounters;
 use std::sync::Arc;
 #[cfg(feature = "bevy")]
@@ -29,9 +33,9 @@ pub struct Renderer {
     pub(super) passes: Arc<Passes>,
     /// The passes that are compiled on another thread; `None` if every pass is compiled by the thread that needs it.
     compiling: Option<Compiling>,
-    /// Whether [`Design::Auto`] is the reference design: on software drivers, where it is faster, and in browsers, where the fast design is
+    /// Whether [`Design::Auto`] is [`Design::GlobalSort`]: on software drivers, where it is faster, and in browsers, where tile bins are
     /// untested.
-    prefers_reference: bool,
+    prefers_global_sort: bool,
     /// Whether the driver is a software driver: threads copy the uniforms of their instance even in a dispatch of a single instance, and the
     /// loops of a thread may end early.
     pub(super) is_software: bool,
@@ -49,7 +53,7 @@ impl Renderer {
     pub fn new(device: &wgpu::Device, checks: ShaderChecks) -> Result<Self, GpuError> {
         check_limits(&device.limits())?;
         let layouts = Arc::new(Layouts::new(device));
-        let activate = module(device, "activate", &[], checks)?;
+        let activate = SHADERS.module(device, "activate", &[], checks)?;
         let info = device.adapter_info();
         let software = info.device_type == wgpu::DeviceType::Cpu;
         let work = WorkCounters::default();
@@ -65,7 +69,7 @@ impl Renderer {
             activate_write: pipeline(&activate, "write", &[&layouts.activate, &layouts.filter]),
             passes: Arc::new(Passes::new(device, layouts.clone(), checks)),
             compiling: None,
-            prefers_reference: software || info.backend == wgpu::Backend::BrowserWebGpu,
+            prefers_global_sort: software || info.backend == wgpu::Backend::BrowserWebGpu,
             is_software: software,
             no_list: allocator.bind_group("gs4d no active list", &layouts.active, &[no_list.as_entire_binding()]),
             layouts,
@@ -95,12 +99,12 @@ impl Renderer {
         Allocator { device, work: &self.work }
     }
 
-    /// Resolves [`Design::Auto`] for this device: returns [`Design::Fast`] or [`Design::Reference`].
+    /// Resolves [`Design::Auto`] for this device: returns [`Design::TileBins`] or [`Design::GlobalSort`].
     pub(super) fn resolve(&self, design: Design) -> Design {
         match design {
-            Design::Auto if self.prefers_reference => Design::Reference,
-            Design::Auto => Design::Fast,
-            chosen @ (Design::Fast | Design::Reference) => chosen,
+            Design::Auto if self.prefers_global_sort => Design::GlobalSort,
+            Design::Auto => Design::TileBins,
+            chosen @ (Design::TileBins | Design::GlobalSort) => chosen,
         }
     }
 
@@ -116,10 +120,10 @@ impl Renderer {
     ) -> Result<(), GpuError> {
         let drawn = std::iter::once((storage, false));
         match self.resolve(design) {
-            Design::Reference => self.passes.compile_reference(device, drawn, Pixels::default(), AtOnce::One),
-            Design::Auto | Design::Fast => {
+            Design::GlobalSort => self.passes.global_sort.compile(device, drawn, Pixels::default(), AtOnce::One),
+            Design::Auto | Design::TileBins => {
                 let lists = Lists::suiting(&device.limits(), 0);
-                self.passes.compile_fast(device, drawn, FastVariant { lists, ..FastVariant::default() })
+                self.passes.tile_bins.compile(device, drawn, BinVariant { lists, ..BinVariant::default() })
             }
         }
     }
@@ -133,30 +137,29 @@ impl Renderer {
         compiling.thread(move || {
             let lists = Lists::suiting(&device.limits(), 0);
             for blending in [Blending::ColorBehindSurfaces, Blending::ColorBehindSamples] {
-                let variant =
-                    FastVariant { lists, blending, precision: ColorPrecision::Half, ..FastVariant::default() };
+                let variant = BinVariant { lists, blending, precision: ColorPrecision::Half, ..BinVariant::default() };
                 let drawn = std::iter::once((storage, false));
                 // A view that needs a refused pass returns the error.
                 let _ = match design {
-                    Design::Reference => passes.compile_reference(&device, drawn, variant.pixels(), AtOnce::One),
-                    Design::Auto | Design::Fast => passes.compile_fast(&device, drawn, variant),
+                    Design::GlobalSort => passes.global_sort.compile(&device, drawn, variant.pixels(), AtOnce::One),
+                    Design::Auto | Design::TileBins => passes.tile_bins.compile(&device, drawn, variant),
                 };
             }
         })
     }
 
-    /// Returns a variant of the passes of the fast design that is compiled: `wanted`, or while that is compiled in the background, another one
+    /// Returns a variant of the passes of tile bins that is compiled: `wanted`, or while that is compiled in the background, another one
     /// that draws the same picture. If there is none, `wanted` is compiled here.
     ///
     /// # Errors
     /// When a shader does not compile.
-    pub(super) fn fast_variant(
+    pub(super) fn bin_variant(
         &self,
         device: &wgpu::Device,
         drawn: impl Iterator<Item = (Storage, bool)> + Clone,
-        wanted: FastVariant,
-    ) -> Result<FastVariant, GpuError> {
-        let is_compiled = |variant: &FastVariant| self.passes.has_fast(drawn.clone(), *variant);
+        wanted: BinVariant,
+    ) -> Result<BinVariant, GpuError> {
+        let is_compiled = |variant: &BinVariant| self.passes.tile_bins.has(drawn.clone(), *variant);
         if is_compiled(&wanted) {
             return Ok(wanted);
         }
@@ -166,7 +169,7 @@ impl Renderer {
             compiling.begin(&self.passes, device, drawn.collect(), wanted);
             return Ok(substitute);
         }
-        self.passes.compile_fast(device, drawn, wanted)?;
+        self.passes.tile_bins.compile(device, drawn, wanted)?;
         Ok(wanted)
     }
 

@@ -6,16 +6,8 @@ use super::memory::Allocator;
 use crate::view::Counts;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Names of the timed passes of a frame of the reference design, in order. The last [`MOTION_PASSES`] are the passes of motions.
-pub(super) const TIMED_PASSES: &[&str] =
-    &["project", "sort (depth)", "bin", "sort (tile)", "ranges", "blend", "motion", "blend (motion)"];
-/// Names of the timed passes of a frame of the fast design, in the same way.
-pub(super) const TIMED_FAST_PASSES: &[&str] =
-    &["project_bin", "sort_bins", "colors", "blend_blocks", "motion", "blend_blocks (motion)"];
 /// The name of the only time of a frame that is timed as a whole.
 pub(super) const WHOLE_FRAME: &[&str] = &["frame"];
-/// Number of passes that only a frame with motions has.
-pub(super) const MOTION_PASSES: usize = 2;
 
 /// Medians over the frames of a benchmark.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]

@@ -91,7 +91,7 @@ const REFUSED: &[(&str, &str)] = &[
     ("mask a -o o --filter interval --data d --engine cpu --checks", "--checks has no effect with --engine cpu"),
     // eval
     ("eval a --data d --gain 3", "the following required arguments were not provided"),
-    ("eval a --data d --engine cpu --renderer fast", "--renderer has no effect with --engine cpu"),
+    ("eval a --data d --engine cpu --renderer bins", "--renderer has no effect with --engine cpu"),
     ("eval a --data d --engine cpu --adapter x", "--adapter has no effect with --engine cpu"),
     ("eval a --data d --engine cpu --checks", "--checks has no effect with --engine cpu"),
     // ablate

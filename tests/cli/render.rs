@@ -123,8 +123,7 @@ fn bench_reports_times_and_counts() {
         ["evaluated", "contributing"].map(|name| row["splats_per_pixel"][name].as_f64().expect("a number"));
     assert!(0.0 < contributing && contributing <= evaluated, "{contributing} of {evaluated} splats are blended");
     assert_eq!(row["timings"]["active"], 1000, "no filter");
-    let ways =
-        ["--renderer", "fast,reference", "--filter", "on,off", "--form", "stored,fp32", "--rounds", "2", "--json"];
+    let ways = ["--renderer", "bins,sort", "--filter", "on,off", "--form", "stored,fp32", "--rounds", "2", "--json"];
     let json = bench(&ways).json();
     let rows = json["rows"].as_array().expect("rows");
     assert_eq!(rows.len(), 8, "every combination");

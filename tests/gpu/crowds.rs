@@ -80,7 +80,7 @@ fn check(count: usize) {
     let views = [0.0, 0.0, 0.01, 0.0].map(view);
     let [straight, aside] = [0, 2].map(|at| expected(&scene, &views[at], count));
     let capture = headless.upload(&scene).expect("the scene fits");
-    for design in [Design::Reference, Design::Fast] {
+    for design in [Design::GlobalSort, Design::TileBins] {
         headless.set_design(design);
         for (number, view) in views.iter().enumerate() {
             let found = headless.render(&capture, view, BACKGROUND).expect("the picture fits");
@@ -113,7 +113,7 @@ fn a_tile_of_many_splats_among_more_hidden_splats_matches_the_cpu_reference() {
     // On software drivers, `blend` blends 64 splats in an iteration.
     let (scene, view) = (crowd(70_000, 800_000), view(0.0));
     let expected = expected(&scene, &view, 70_000);
-    headless.set_design(Design::Reference);
+    headless.set_design(Design::GlobalSort);
     let capture = headless.upload(&scene).expect("the scene fits");
     let found = headless.render(&capture, &view, BACKGROUND).expect("the picture fits");
     assert_close(found.picture.pixels.into_iter(), &expected, "70,000 of 870,000 splats");
@@ -129,7 +129,7 @@ fn the_first_frames_of_a_view_without_counters_match_the_cpu_reference() {
     let expected = expected(&scene, &seen, 45_000);
     let capture = GpuCapture::upload(&context.device, &context.queue, &renderer, &scene).expect("the scene fits");
     let instances = [Instance { capture: &capture, active: None, view: seen, appearance: Appearance::default() }];
-    for design in [Design::Reference, Design::Fast] {
+    for design in [Design::GlobalSort, Design::TileBins] {
         let mut view = ViewRenderer::new(&context.device, &renderer);
         view.set_design(&renderer, design);
         for number in 0..4 {
@@ -141,16 +141,20 @@ fn the_first_frames_of_a_view_without_counters_match_the_cpu_reference() {
 }
 
 #[test]
-fn small_scenes_are_drawn_in_the_fast_design_on_every_driver() {
+fn small_scenes_are_drawn_in_tile_bins_on_every_driver() {
     let Some(mut headless) = gpu::headless() else { return };
-    headless.set_design(Design::Fast);
+    headless.set_design(Design::TileBins);
     let draw = |headless: &mut Headless, count: usize| {
         let capture = headless.upload(&crowd(count, 0)).expect("the scene fits");
         headless.render(&capture, &view(0.0), BACKGROUND).expect("the picture fits");
         headless.design()
     };
-    assert_eq!(draw(&mut headless, 5_000), Design::Fast, "5,000 splats in a tile are within the loops of every driver");
+    assert_eq!(
+        draw(&mut headless, 5_000),
+        Design::TileBins,
+        "5,000 splats in a tile are within the loops of every driver"
+    );
     let software = headless.context().info.device_type == wgpu::DeviceType::Cpu;
-    let expected = if software { Design::Reference } else { Design::Fast };
+    let expected = if software { Design::GlobalSort } else { Design::TileBins };
     assert_eq!(draw(&mut headless, 45_000), expected, "45,000 splats in a tile exceed the loops of software drivers");
 }

@@ -1,7 +1,7 @@
 //! Views without colors, as for shadow maps.
 //!
-//! In: a synthetic scene, drawn with colors and without. Out: proof that depths and transmittance do not depend on colors, and that the fast
-//! design leaves the colors out. Skipped where there is no GPU.
+//! In: a synthetic scene, drawn with colors and without. Out: proof that depths and transmittance do not depend on colors, and that tile
+//! bins leave the colors out. Skipped where there is no GPU.
 
 use crate::support::gpu::{self, CHECKS};
 use bevy_gs4d::renderer::{Design, GpuCapture, GpuContext, Instance, Renderer, ViewParameters, ViewRenderer};
@@ -57,7 +57,7 @@ fn depths_and_transmittance_do_not_depend_on_colors() {
     let view: View =
         Camera::look_at(Vec3::new(2.2, 1.1, 1.4), Vec3::ZERO, Vec3::Z, 0.9, SIZE).view(0.5, RasterFov::Corrected);
     let one = Instance { capture: &capture, active: None, view, appearance: Appearance::default() };
-    for design in [Design::Reference, Design::Fast] {
+    for design in [Design::GlobalSort, Design::TileBins] {
         let new = || {
             let mut view = ViewRenderer::new(&context.device, &renderer);
             view.set_design(&renderer, design);
@@ -70,6 +70,6 @@ fn depths_and_transmittance_do_not_depend_on_colors() {
         let transmittances = |colors: &[f32]| colors.iter().skip(3).step_by(4).copied().collect::<Vec<_>>();
         assert!(transmittances(&colors) == transmittances(&without), "{design:?}: the transmittances are equal");
         let is_dark = without.chunks_exact(4).all(|pixel| pixel[..3] == [0.0; 3]);
-        assert_eq!(is_dark, design == Design::Fast, "{design:?}: only the fast design leaves the colors out");
+        assert_eq!(is_dark, design == Design::TileBins, "{design:?}: only tile bins leave the colors out");
     }
 }

@@ -37,7 +37,7 @@ fn counters_of_another_design_do_not_change_the_buffers_of_a_view() {
         });
         bytes.collect::<Vec<_>>()
     };
-    for (first, second) in [(Design::Reference, Design::Fast), (Design::Fast, Design::Reference)] {
+    for (first, second) in [(Design::GlobalSort, Design::TileBins), (Design::TileBins, Design::GlobalSort)] {
         let fresh = draw(&mut ViewRenderer::new(&context.device, &renderer), second);
         let most = fresh.iter().copied().max().expect("frames");
         let mut view = ViewRenderer::new(&context.device, &renderer);
@@ -61,12 +61,12 @@ fn the_buffers_of_passes_are_those_of_the_reference_design() {
     let capture = headless.upload(&scene).expect("the scene fits");
     let camera = Camera::look_at(Vec3::new(2.2, 1.1, 1.4), Vec3::ZERO, Vec3::Z, 0.8, UVec2::new(64, 48));
     let view = camera.view(0.5, RasterFov::default());
-    headless.set_design(Design::Fast);
+    headless.set_design(Design::TileBins);
     headless.render(&capture, &view, Background::None).expect("the picture fits");
-    assert!(headless.finished().is_none(), "the fast design has none of these buffers");
-    headless.set_design(Design::Reference);
+    assert!(headless.finished().is_none(), "tile bins have none of these buffers");
+    headless.set_design(Design::GlobalSort);
     let counts = headless.render(&capture, &view, Background::None).expect("the picture fits").counts;
-    let frame = headless.finished().expect("the reference design has them");
+    let frame = headless.finished().expect("the global sort has them");
     let bytes = headless.copy_out(frame.counters, 8).expect("counters");
     let found: Vec<u32> =
         bytes.chunks_exact(4).map(|word| u32::from_ne_bytes(word.try_into().expect("four bytes"))).collect();

@@ -146,7 +146,7 @@ fn the_capacity_of_a_view_is_the_maximum_of_active_gaussians() {
     let filtered = RuntimeScene { filter: Some(filter), ..whole };
     let capture = headless.upload(&filtered).expect("the scene fits the GPU");
     // The capacity in splats is that of the buffers of this design.
-    headless.set_design(Design::Reference);
+    headless.set_design(Design::GlobalSort);
     let mut made = None;
     for time in times() {
         let frame = headless.render(&capture, &view(time), BLACK).expect("the view is drawn");

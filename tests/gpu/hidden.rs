@@ -3,10 +3,11 @@
 //! In: a list of `blend_blocks` in which splats behind a surface precede splats in front of it, as no sorted list has them. Out: proof that a
 //! pixel visits no batch after the first whose last splat is hidden: it does not show the later splats. Skipped where there is no GPU.
 
+use crate::support::composed::compose;
 use crate::support::gpu;
 use crate::support::surfaces::{depth_texture, edge};
 use bevy_gs4d::internal::renderer::layout::{FrameUniforms, SplatShape, VisibleSplat};
-use bevy_gs4d::internal::renderer::shaders::{Blending, EIGHT_AT_ONCE, LARGE_BATCHES, compose};
+use bevy_gs4d::internal::renderer::tile_bins::{Blending, EIGHT_AT_ONCE, LARGE_BATCHES};
 use bevy_gs4d::renderer::GpuContext;
 use bytemuck::{Pod, Zeroable};
 use glam::UVec2;

@@ -2,17 +2,20 @@
 //!
 //! In: the composed passes with naga's layout. Out: proof that every structure and constant is the same in the shaders and on the host.
 
+use crate::support::composed::{compose, pass_names};
 use bevy_gs4d::gaussian::{Gaussian, MARGINAL_CUTOFF};
 use bevy_gs4d::internal::gaussian::alpha::{ALPHA_MAX, ALPHA_MIN, TRANSMITTANCE_MIN};
 use bevy_gs4d::internal::gaussian::conic::{LOW_PASS, MAX_VARIANCE, THIN};
 use bevy_gs4d::internal::offline::fine_tune::NEIGHBORS;
-use bevy_gs4d::internal::renderer::layout::{
-    self, Activation, AdamUniforms, BLOCK, Counters, DIGITS, DropoutUniforms, FIRST_SEEN, FrameUniforms,
-    INSTANCE_STRIDE, INSTANCES_AT_ONCE, InstanceUniforms, LossUniforms, MotionUniforms, NoiseUniforms,
-    RelocationUniforms, RoundingRecord, SortStep, SplatRecord, SplatShape, TermWeights, TiedColors, TrainedRecord,
-    TrainedScene, VisibleSplat,
+use bevy_gs4d::internal::offline::layout::{
+    AdamUniforms, DropoutUniforms, FIRST_SEEN, LossUniforms, NoiseUniforms, RelocationUniforms, RoundingRecord,
+    TermWeights, TiedColors, TrainedRecord, TrainedScene,
 };
-use bevy_gs4d::internal::renderer::shaders::{COPIED_INSTANCE, compose, pass_names};
+use bevy_gs4d::internal::renderer::layout::{
+    self, Activation, BLOCK, Counters, DIGITS, FrameUniforms, INSTANCE_STRIDE, INSTANCES_AT_ONCE, InstanceUniforms,
+    MotionUniforms, SortStep, SplatRecord, SplatShape, VisibleSplat,
+};
+use bevy_gs4d::internal::renderer::shaders::COPIED_INSTANCE;
 use bevy_gs4d::view::TILE_SIZE;
 use std::collections::{BTreeMap, BTreeSet};
 use std::mem::offset_of;
@@ -244,7 +247,7 @@ fn structures_of_the_host_have_no_padding_between_members() {
 
 /// Returns the value of a constant in double precision, which represents every u32 and f32.
 fn constant(module: &Module, name: &str) -> f64 {
-    let found = module.constants.iter().find(|(_, constant)| constant.name.as_deref() == Some(name));
+    let found = module.constants.iter().find(|(_, constant)| constant.name.as_deref().map(plain) == Some(name));
     let (_, constant) = found.unwrap_or_else(|| panic!("there is no constant `{name}`"));
     match module.global_expressions[constant.init] {
         Expression::Literal(Literal::F32(value)) => value.into(),

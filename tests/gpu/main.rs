@@ -9,7 +9,6 @@ mod crowds;
 mod depths_alone;
 mod designs;
 mod detail;
-mod fast;
 mod filter;
 mod fine_tune;
 mod fine_tune_run;
@@ -25,6 +24,7 @@ mod render;
 mod score;
 mod shaders;
 mod thin;
+mod tile_bins;
 mod train;
 mod uniformity;
 
@@ -32,6 +32,7 @@ mod uniformity;
 mod support {
     pub mod blob;
     pub mod capture;
+    pub mod composed;
     pub mod dataset;
     pub mod golden;
     pub mod gpu;

@@ -50,7 +50,7 @@ fn a_software_driver_compiles_no_shader_after_the_first_pictures() {
         }
         let (coded, _) = compress(scene(600, 3, 2), &settings(&[16, 8])).expect("compression succeeds");
         let scenes = [("sliced", scene(600, 3, 2)), ("coded", coded.into_runtime().expect("drawable"))];
-        for design in [Design::Reference, Design::Fast] {
+        for design in [Design::GlobalSort, Design::TileBins] {
             headless.set_design(design);
             for (name, scene) in &scenes {
                 let [before, after] = compiled_in_turn(&mut headless, scene);

@@ -14,7 +14,7 @@ use bevy_gs4d::scene::RuntimeScene;
 use bevy_gs4d::view::{Appearance, Background, BlendSpace, Camera, Counts, RasterFov, View};
 use glam::{UVec2, Vec2, Vec3};
 
-const DESIGNS: [Design; 2] = [Design::Reference, Design::Fast];
+const DESIGNS: [Design; 2] = [Design::GlobalSort, Design::TileBins];
 
 /// Returns the view from a place displaced by `aside`, at a time of [0, 1].
 fn view(aside: f32, time: f32) -> View {

@@ -389,7 +389,7 @@ fn frames_that_exceed_the_capacity_of_pairs_are_complete() {
     let (scene, _, close) = afar_and_close();
     let capture = headless.upload(&scene).expect("upload");
     let renderer = Renderer::new(&headless.context().device, ShaderChecks::On).expect("the passes compile");
-    for design in [Design::Reference, Design::Fast] {
+    for design in [Design::GlobalSort, Design::TileBins] {
         headless.set_design(design);
         // The second frame has the capacity that the first frame needed.
         headless.render(&capture, &close, BACKGROUND).expect("render");
@@ -405,7 +405,7 @@ fn frames_that_exceed_the_capacity_of_pairs_are_complete() {
             draw_frame(headless.context(), &renderer, &mut view, &instances, BACKGROUND);
             let bytes = view.statistics().bytes;
             let room = *first_bytes.get_or_insert(bytes);
-            // Four bytes for each pair in the fast design, more in the reference design.
+            // Four bytes for each pair in tile bins, more in the global sort.
             let needed = u64::from(expected.counts.pairs - FIRST_CAPACITY) * 4;
             let grown = bytes >= room + needed;
             assert_eq!(grown, frame == 2, "{design:?}, frame {frame}: {bytes} bytes, {room} in the first frame");
@@ -421,7 +421,7 @@ fn frames_with_more_pairs_than_the_device_allows_are_complete() {
     let Some(mut headless) = gpu::headless() else { return };
     let Some(mut limited) = limited_device::headless() else { return };
     let (scene, view) = (swollen(6_000, 10.0), look_from(EYE, UVec2::new(400, 300), 0.5));
-    for design in [Design::Reference, Design::Fast] {
+    for design in [Design::GlobalSort, Design::TileBins] {
         let [expected, found] = [(&mut headless, 1), (&mut limited, 2)].map(|(headless, frames)| {
             headless.set_design(design);
             let capture = headless.upload(&scene).expect("upload");
@@ -495,7 +495,7 @@ fn a_picture_that_grows_step_by_step_needs_few_new_buffers() {
     let Some(mut headless) = gpu::headless() else { return };
     let scene = scene(500);
     let capture = headless.upload(&scene).expect("upload");
-    for design in [Design::Reference, Design::Fast] {
+    for design in [Design::GlobalSort, Design::TileBins] {
         headless.set_design(design);
         let (mut created, mut changes) = (headless.work().created(), 0);
         // Growing, then shrinking.

@@ -3,10 +3,11 @@
 //! In: the files of `shaders/`. Out: proof that each file is known to the renderer and is valid WGSL, and that only the variants for devices
 //! with optional capabilities need these capabilities.
 
-use bevy_gs4d::internal::renderer::shaders::{
-    ATOMIC_SUMS, AtOnce, BINNED, Blending, COMPAT, COMPAT_WITHOUT_TIME, COPIED_INSTANCE, EIGHT_AT_ONCE, FEW_BINS,
-    LARGE_BATCHES, Lists, MULTISAMPLED, SUBGROUPS_OF_32, compose, pass_names,
-};
+use crate::support::composed::{compose, pass_names};
+use bevy_gs4d::internal::offline::shaders::{ATOMIC_SUMS, COMPAT, COMPAT_WITHOUT_TIME};
+use bevy_gs4d::internal::renderer::global_sort::AtOnce;
+use bevy_gs4d::internal::renderer::shaders::{BINNED, COPIED_INSTANCE, MULTISAMPLED, SUBGROUPS_OF_32};
+use bevy_gs4d::internal::renderer::tile_bins::{Blending, EIGHT_AT_ONCE, FEW_BINS, LARGE_BATCHES, Lists};
 use bevy_gs4d::renderer::{ColorPrecision, Storage};
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 use std::collections::BTreeSet;
@@ -29,8 +30,10 @@ fn report(failures: Vec<String>) {
 
 #[test]
 fn every_shader_file_is_a_pass_of_the_renderer_or_of_the_plugin() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders");
-    let files = std::fs::read_dir(folder).expect("the folder of shaders").map(|entry| entry.expect("an entry").path());
+    let folders = ["shaders", "shaders/global_sort", "shaders/tile_bins", "shaders/offline"]
+        .map(|folder| Path::new(env!("CARGO_MANIFEST_DIR")).join(folder));
+    let files = folders.iter().flat_map(|folder| std::fs::read_dir(folder).expect("the folder of shaders"));
+    let files = files.map(|entry| entry.expect("an entry").path());
     let shaders = files.filter(|path| path.extension().is_some_and(|ending| ending == "wgsl"));
     let mut names: BTreeSet<String> =
         shaders.filter_map(|path| Some(path.file_stem()?.to_string_lossy().into_owned())).collect();
@@ -111,7 +114,7 @@ fn workgroup_memory_is_within_the_required_limits() {
             .map(|definitions| ("blend_blocks", definitions.concat(), 32 * 1024));
     let large = large.iter().map(|(name, definitions, limit)| (*name, &definitions[..], *limit));
     let sorting = Lists::ALL.map(|lists| ("sort_bins", lists.definitions(), lists.memory()));
-    let binning = [("project", BINNED, 16 * 1024)];
+    let binning = [("project_bin", &[][..], 16 * 1024)];
     for (name, definitions, limit) in blending.into_iter().chain(large).chain(sorting).chain(binning) {
         let module = compose(name, definitions).expect("the pass composes");
         let shared = module.global_variables.iter().filter(|(_, v)| v.space == AddressSpace::WorkGroup);

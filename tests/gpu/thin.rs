@@ -15,7 +15,7 @@ use bevy_gs4d::view::{Background, View};
 fn least_psnr(headless: &mut Headless, scene: &RuntimeScene, view: &View) -> [f64; 2] {
     let background = Background::Color([0.1, 0.2, 0.3]);
     let expected = render(scene, view, background).picture;
-    let pictures = [Design::Reference, Design::Fast].map(|design| {
+    let pictures = [Design::GlobalSort, Design::TileBins].map(|design| {
         headless.set_design(design);
         let capture = headless.upload(scene).expect("the scene fits");
         headless.render(&capture, view, background).expect("the picture fits").picture

@@ -10,9 +10,9 @@ use bevy_gs4d::gaussian::{Gaussian, GradientMode, Harmonics, Parameters};
 use bevy_gs4d::internal::offline::fine_tune::{
     Sample, StepGrowth, Terms, Trainer, TrainerState, is_dropped, neighbors, noise, regularization, relocate,
 };
+use bevy_gs4d::internal::offline::layout::TrainedRecord;
 use bevy_gs4d::internal::offline::store::{Key, Store};
 use bevy_gs4d::internal::offline::train::{CaptureSettings, Start, StartSettings, begin, capture_of, train};
-use bevy_gs4d::internal::renderer::layout::TrainedRecord;
 use bevy_gs4d::offline::dataset::TrainingView;
 use bevy_gs4d::offline::fine_tune::{FineTuneSettings, FineTuned, Growth, Rates, Resume, TrainingImages};
 use bevy_gs4d::offline::metrics::SquaredError;

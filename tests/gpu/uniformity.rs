@@ -4,9 +4,10 @@
 //! index, workgroup memory that is not read by `workgroupUniformLoad`, a buffer that the shader writes, the result of an atomic. The members of
 //! a variable are not distinguished, as in browsers.
 
-use bevy_gs4d::internal::renderer::shaders::{
-    AtOnce, BINNED, Blending, COPIED_INSTANCE, EIGHT_AT_ONCE, LARGE_BATCHES, Lists, MULTISAMPLED, compose, pass_names,
-};
+use crate::support::composed::{compose, pass_names};
+use bevy_gs4d::internal::renderer::global_sort::AtOnce;
+use bevy_gs4d::internal::renderer::shaders::{COPIED_INSTANCE, MULTISAMPLED};
+use bevy_gs4d::internal::renderer::tile_bins::{Blending, EIGHT_AT_ONCE, LARGE_BATCHES, Lists};
 use bevy_gs4d::renderer::Storage;
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -260,7 +261,7 @@ fn no_barrier_depends_on_a_value_that_differs_between_threads() {
     let lists = Lists::ALL.into_iter().map(|lists| ("sort_bins", lists.definitions().to_vec()));
     let at_once = AtOnce::ALL.into_iter().map(|at_once| ("blend", [at_once.definitions(), MULTISAMPLED].concat()));
     let readers = Storage::ALL.into_iter().flat_map(|storage| {
-        [("project", BINNED), ("colors", COPIED_INSTANCE)]
+        [("project_bin", &[][..]), ("colors", COPIED_INSTANCE)]
             .map(|(name, own)| (name, [own, storage.definitions()].concat()))
     });
     let eight = ("blend_blocks", [Blending::ColorBehindSurfaces.definitions(), EIGHT_AT_ONCE].concat());

@@ -25,7 +25,7 @@ const FEW: usize = 200;
 /// A renderer of each design; `None` until [`open`] and without a GPU.
 static RENDERERS: Mutex<Option<[Headless; 2]>> = Mutex::new(None);
 /// The designs of the renderers.
-const DESIGNS: [Design; 2] = [Design::Reference, Design::Fast];
+const DESIGNS: [Design; 2] = [Design::GlobalSort, Design::TileBins];
 static SCENES: AtomicUsize = AtomicUsize::new(0);
 static PICTURES: AtomicUsize = AtomicUsize::new(0);
 static SHOWING: AtomicUsize = AtomicUsize::new(0);
@@ -80,18 +80,18 @@ pub fn compare(scene: &RuntimeScene, limits: &Limits, expected: &[Expected]) -> 
         };
         frames.push(expected.iter().map(draw).collect::<Result<Vec<Frame>, String>>()?);
     }
-    for ((expected, reference), fast) in expected.iter().zip(&frames[0]).zip(&frames[1]) {
+    for ((expected, sorted), binned) in expected.iter().zip(&frames[0]).zip(&frames[1]) {
         let Expected { view, background, frame } = expected;
         let (time, brightest) = (view.time, limits.brightest(*background));
-        let [a, b] = [reference, fast].map(|frame| frame.counts.visible);
+        let [a, b] = [sorted, binned].map(|frame| frame.counts.visible);
         if a != b {
-            return Err(format!("is drawn with {a} splats by the design Reference and {b} by Fast at time {time}"));
+            return Err(format!("is drawn with {a} splats by the global sort and {b} by tile bins at time {time}"));
         }
-        same(fast, &Ranges::exact(reference, brightest))
+        same(binned, &Ranges::exact(sorted, brightest))
             .map_err(|worst| format!("is drawn differently by the designs at time {time}: {worst}"))?;
         let exact = Ranges::exact(frame, brightest);
-        if same(reference, &exact).is_err() {
-            same(reference, &exact.rounded(scene, view, *background))
+        if same(sorted, &exact).is_err() {
+            same(sorted, &exact.rounded(scene, view, *background))
                 .map_err(|worst| format!("is drawn differently by the GPU and the CPU at time {time}: {worst}"))?;
             ROUNDED.fetch_add(1, Ordering::Relaxed);
         }

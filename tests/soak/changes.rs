@@ -147,7 +147,7 @@ impl Changes {
                 format!("{:?}", camera.msaa)
             }
             3..6 => {
-                camera.settings.design = [Design::Auto, Design::Fast, Design::Reference][what - 3];
+                camera.settings.design = [Design::Auto, Design::TileBins, Design::GlobalSort][what - 3];
                 format!("{:?}", camera.settings.design)
             }
             6..9 => {

@@ -121,7 +121,7 @@ impl Cutter {
         let mut app = checks::app(SIZE);
         app.insert_resource(CaptureUploadBudget { bytes_per_frame: BUDGET });
         let mut viewer = Viewer::default();
-        viewer.settings.design = Design::Reference;
+        viewer.settings.design = Design::GlobalSort;
         let target = app.world().resource::<Offscreen>().clone();
         let camera = spawn_camera(&mut app, &target, &viewer);
         let crowd = spawn(&mut app, crowd(), Transform::default());
@@ -188,8 +188,8 @@ impl Cutter {
         }
         self.room = 0;
         if self.random.below(2) == 0 {
-            let fast = self.viewer.settings.design == Design::Fast;
-            self.viewer.settings.design = if fast { Design::Reference } else { Design::Fast };
+            let binned = self.viewer.settings.design == Design::TileBins;
+            self.viewer.settings.design = if binned { Design::GlobalSort } else { Design::TileBins };
             self.app.world_mut().entity_mut(self.camera).insert((self.viewer.pose, self.viewer.settings));
         } else {
             let target = self.app.world().resource::<Offscreen>().clone();

@@ -2,8 +2,8 @@
 //!
 //! In: the name of a pass, and buffers by their names in its shader. Out: the contents of these buffers after a dispatch.
 
+use super::composed::compose;
 use crate::support::no_gpu::no_gpu;
-use bevy_gs4d::internal::renderer::shaders;
 use bevy_gs4d::renderer::GpuContext;
 use bytemuck::Pod;
 use std::borrow::Cow;
@@ -67,7 +67,7 @@ impl Gpu {
     /// Compiles every entry point of a pass. The bindings, all of which are buffers, are those that naga finds in the shader.
     pub fn pass(&self, name: &str) -> Pass<'_> {
         let device = &self.0.device;
-        let module = shaders::compose(name, &[]).expect("the pass composes");
+        let module = compose(name, &[]).expect("the pass composes");
         let mut resources = Vec::new();
         let mut groups: BTreeMap<u32, Vec<wgpu::BindGroupLayoutEntry>> = BTreeMap::new();
         for (_, variable) in module.global_variables.iter() {

@@ -51,7 +51,8 @@ impl EngineArgs {
 /// How views are drawn.
 #[derive(clap::Args)]
 pub(crate) struct DesignArgs {
-    /// How views are drawn on a GPU; all draw the same picture. auto: fast, but reference on a software driver.
+    /// How views are drawn on a GPU; all draw the same picture. bins: tile bins; sort: a global sort; auto: bins,
+    /// but sort on a software driver.
     #[arg(long, value_name = "RENDERER", default_value = "auto", value_parser = values::one_of(&Design::NAMES))]
     pub renderer: Design,
 }
@@ -68,7 +69,8 @@ pub(crate) struct RendererArgs {
 /// In which ways views are drawn, and where.
 #[derive(clap::Args)]
 pub(crate) struct RenderersArgs {
-    /// How views are drawn, one or more; all draw the same picture. auto: fast, but reference on a software driver.
+    /// How views are drawn, one or more; all draw the same picture. bins: tile bins; sort: a global sort; auto: bins,
+    /// but sort on a software driver.
     #[arg(long = "renderer", value_name = "RENDERER,..", default_value = "auto", value_delimiter = ',',
         value_parser = values::one_of(&Design::NAMES))]
     pub renderers: Vec<Design>,

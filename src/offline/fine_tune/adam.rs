@@ -1,4 +1,4 @@
-//! Adam; CPU reference of `shaders/adam.wgsl`.
+//! Adam; CPU reference of `shaders/offline/adam.wgsl`.
 //!
 //! In: a value, its gradient, its moments, a rate. Out: the value and the moments after a step (section 6 of the 4DGS model; torch's
 //! equations).

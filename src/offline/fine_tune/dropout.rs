@@ -1,4 +1,4 @@
-//! Dropout of Gaussians; CPU reference of `shaders/dropout.wgsl`.
+//! Dropout of Gaussians; CPU reference of `shaders/offline/dropout.wgsl`.
 //!
 //! In: the index of a Gaussian, the seed of a step, a share. Out: whether the views of the step are drawn without the Gaussian. Training
 //! with few views of each moment fits these with Gaussians that other views contradict; a picture that has to be right without a random

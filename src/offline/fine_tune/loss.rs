@@ -1,4 +1,4 @@
-//! The loss of a view; CPU reference of `shaders/loss.wgsl`.
+//! The loss of a view; CPU reference of `shaders/offline/loss.wgsl`.
 //!
 //! In: a picture and its image. Out: `(1 - share) L1 + share (1 - SSIM)`, the opacity mask, and their gradients with respect to each pixel
 //! (section 6 of the 4DGS model).

@@ -1,4 +1,4 @@
-//! Noise of means; CPU reference of `shaders/noise.wgsl`.
+//! Noise of means; CPU reference of `shaders/offline/noise.wgsl`.
 //!
 //! In: the raw parameters of a native 4D Gaussian, its index, the seed of a step, a strength, the least temporal scale. Out: its mean after
 //! the step, moved at random in space and time if the Gaussian is faint; its temporal scale, if it was smaller.
@@ -10,7 +10,7 @@
 
 use super::random_words::{STRIDE, mixed, word_of};
 use crate::gaussian::rotation_4d;
-use crate::renderer::layout::TrainedRecord;
+use crate::offline::layout::TrainedRecord;
 use glam::DVec4;
 use std::f64::consts::TAU;
 

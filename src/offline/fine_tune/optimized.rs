@@ -4,7 +4,7 @@
 
 use super::adam::correction;
 use super::passes::Passes;
-use crate::renderer::layout::AdamUniforms;
+use crate::offline::layout::AdamUniforms;
 use crate::renderer::{GpuError, Headless};
 use wgpu::BufferUsages;
 

@@ -7,7 +7,7 @@ use super::optimized::Optimized;
 use super::passes::Passes;
 use super::totals::Faults;
 use crate::gaussian::Model;
-use crate::renderer::layout::{FIRST_SEEN, TrainedRecord, TrainedScene};
+use crate::offline::layout::{FIRST_SEEN, TrainedRecord, TrainedScene};
 use crate::renderer::{GpuError, Headless};
 use wgpu::BufferUsages;
 

@@ -2,9 +2,10 @@
 //!
 //! In: a headless renderer, shader definitions. Out: [`Passes`]; an error if a limit of the device is too low.
 
+use crate::offline::layout::{AdamUniforms, LossUniforms, TiedColors, TrainedScene};
+use crate::offline::shaders::SHADERS;
 use crate::renderer::bind::{Bind, group_layout, pipeline};
-use crate::renderer::layout::{AdamUniforms, FrameUniforms, InstanceUniforms, LossUniforms, TiedColors, TrainedScene};
-use crate::renderer::shaders::module;
+use crate::renderer::layout::{FrameUniforms, InstanceUniforms};
 use crate::renderer::{GpuError, Headless, ShaderChecks};
 
 /// Layouts and pipelines of the passes of training.
@@ -61,12 +62,12 @@ impl Passes {
         let adam_group = group("gs4d adam", &[Uniform(size_of::<AdamUniforms>()), Write, Write, Write, Write, Read]);
         let tied = [Uniform(size_of::<TiedColors>()), Read, Read, Read, Read, Write, Read, Write];
         let tied_group = group("gs4d tied colors", &tied);
-        let slice = module(device, "slice", &[], checks)?;
-        let codebooks = module(device, "codebooks", &[], checks)?;
-        let loss = module(device, "loss", &[], checks)?;
-        let blend_backward = module(device, "blend_backward", definitions, checks)?;
-        let project_backward = module(device, "project_backward", definitions, checks)?;
-        let adam = module(device, "adam", &[], checks)?;
+        let slice = SHADERS.module(device, "slice", &[], checks)?;
+        let codebooks = SHADERS.module(device, "codebooks", &[], checks)?;
+        let loss = SHADERS.module(device, "loss", &[], checks)?;
+        let blend_backward = SHADERS.module(device, "blend_backward", definitions, checks)?;
+        let project_backward = SHADERS.module(device, "project_backward", definitions, checks)?;
+        let adam = SHADERS.module(device, "adam", &[], checks)?;
         let make = |module, entry, groups: &[&wgpu::BindGroupLayout]| {
             let groups: Vec<_> = groups.iter().copied().map(Some).collect();
             pipeline(device, module, entry, &groups)

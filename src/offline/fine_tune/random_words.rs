@@ -1,4 +1,4 @@
-//! Random words by hashing; CPU reference of `shaders/shared/random.wgsl`.
+//! Random words by hashing; CPU reference of `shaders/offline/shared/random.wgsl`.
 //!
 //! In: the index of a Gaussian, the seed of a step. Out: a random word, the same on every run.
 

@@ -3,7 +3,7 @@
 //! In: parameters of a scene, or records and values of the GPU. Out: the other of the two.
 
 use crate::gaussian::{Harmonics, Parameters};
-use crate::renderer::layout::TrainedRecord;
+use crate::offline::layout::TrainedRecord;
 
 /// Returns the raw parameters as `slice` reads them.
 pub(super) fn records(parameters: &Parameters) -> Vec<TrainedRecord> {

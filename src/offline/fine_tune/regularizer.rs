@@ -5,9 +5,9 @@
 use super::neighbors::{NEIGHBORS, neighbors};
 use super::parameters::ParameterBuffers;
 use super::terms::{MOMENT, Terms};
+use crate::offline::layout::{TermWeights, TrainedRecord, TrainedScene};
+use crate::offline::shaders::SHADERS;
 use crate::renderer::bind::{Bind, group_layout, pipeline};
-use crate::renderer::layout::{TermWeights, TrainedRecord, TrainedScene};
-use crate::renderer::shaders::module;
 use crate::renderer::{GpuError, Headless, ShaderChecks};
 use wgpu::BufferUsages;
 
@@ -40,7 +40,7 @@ impl Regularizer {
         let sizes = [size_of::<TrainedScene>(), size_of::<TermWeights>()];
         let bindings = [Uniform(sizes[0]), Uniform(sizes[1]), Read, Read, Read, Write];
         let layout = group_layout(device, "gs4d terms", &bindings);
-        let shader = module(device, "regularize", &[], ShaderChecks::Off)?;
+        let shader = SHADERS.module(device, "regularize", &[], ShaderChecks::Off)?;
         let weights = allocator.buffer("gs4d weights of terms", sizes[1] as u64, BufferUsages::UNIFORM);
         let share = 1.0 / count as f64;
         let settings = TermWeights {

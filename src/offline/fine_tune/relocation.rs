@@ -1,4 +1,4 @@
-//! Relocation of Gaussians that have faded; CPU reference of `shaders/relocate.wgsl`.
+//! Relocation of Gaussians that have faded; CPU reference of `shaders/offline/relocate.wgsl`.
 //!
 //! In: raw parameters, the seed of random numbers. Out: the parameters with every faded Gaussian at the place of a live one, drawn by opacity,
 //! and the moves, by which colors are copied. The picture hardly changes (3DGS-MCMC): of `N` Gaussians in one place each gets
@@ -10,7 +10,7 @@
 //! so that alpha in the center, and its integral along any line through the center, stay as they were. The temporal scale gets the same
 //! factor as the others: then the integral over time stays too, and so does the velocity, which is a ratio of covariances.
 
-use crate::renderer::layout::TrainedRecord;
+use crate::offline::layout::TrainedRecord;
 use crate::scene::random::Random;
 
 /// Opacity up to which a Gaussian has faded.

@@ -6,10 +6,10 @@
 use super::parameters::ParameterBuffers;
 use super::trainer_error::TrainerError;
 use crate::gaussian::{Parameters, SliceSettings};
+use crate::offline::layout::{RoundingRecord, TrainedScene};
 use crate::offline::quantize::roundings;
+use crate::offline::shaders::SHADERS;
 use crate::renderer::bind::{Bind, group_layout, pipeline};
-use crate::renderer::layout::{RoundingRecord, TrainedScene};
-use crate::renderer::shaders::module;
 use crate::renderer::{GpuError, Headless, ShaderChecks};
 use crate::scene::TrainedWith;
 use crate::scene::packed::Rounding;
@@ -50,7 +50,7 @@ impl Rounder {
         let (allocator, device) = (headless.allocator(), &headless.context().device);
         let bindings = [Uniform(size_of::<TrainedScene>()), Read, Write, Write];
         let layout = group_layout(device, "gs4d rounding", &bindings);
-        let shader = module(device, "rounding", &[], ShaderChecks::Off)?;
+        let shader = SHADERS.module(device, "rounding", &[], ShaderChecks::Off)?;
         // As large as the raw parameters, which fit one binding.
         let size = (parameters.count() as usize * size_of::<RoundingRecord>()) as u64;
         let changes = allocator.buffer("gs4d rounding", size, BufferUsages::STORAGE | BufferUsages::COPY_SRC);

@@ -3,8 +3,8 @@
 //! In: a choice, a renderer. Out: the shader definitions of `blend_backward` and `project_backward`; an error if the device cannot do it.
 
 use super::trainer_error::TrainerError;
+use crate::offline::shaders::ATOMIC_SUMS;
 use crate::renderer::Headless;
-use crate::renderer::shaders::ATOMIC_SUMS;
 
 /// How the gradient of a splat is summed over the tiles that it covers. Default: [`Deterministic`](Self::Deterministic).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]

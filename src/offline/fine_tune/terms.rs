@@ -1,4 +1,4 @@
-//! Further terms of the loss; CPU reference of `shaders/regularize.wgsl`.
+//! Further terms of the loss; CPU reference of `shaders/offline/regularize.wgsl`.
 //!
 //! In: raw parameters, the neighbors of each Gaussian, weights. Out: the terms that depend on Gaussians alone, and the gradient of their
 //! weighted sum. These are, with `u` 0.1 times the velocity c/v (section 6 of the 4DGS model; the original has no terms of opacity and scale):

@@ -7,7 +7,7 @@
 //! |---|---|---|
 //! | `slice` | raw parameters | the records that `project` reads |
 //! | `rounding` | these records, what packing changes of each | the same, once geometry is [rounded](Trainer::round) |
-//! | the passes of the reference design | records, color | splats, pairs, picture |
+//! | the passes of the global sort | records, color | splats, pairs, picture |
 //! | `loss` | picture, image | gradients of pixels, sums |
 //! | `blend_backward` | splats, pairs, gradients of pixels | gradients of pairs |
 //! | `project_backward` | gradients of pairs, parameters | gradients of raw parameters, added up over a batch; which Gaussians were seen |
@@ -37,10 +37,10 @@ use super::trainer_error::TrainerError;
 use crate::gaussian::harmonics::evaluated;
 use crate::gaussian::{GradientMode, Model};
 use crate::offline::dataset::CoveredImage;
+use crate::offline::layout::{LossUniforms, NoiseUniforms, TrainedRecord};
 use crate::offline::quantize::codebook::Centers;
-use crate::renderer::layout::{LossUniforms, NoiseUniforms, TrainedRecord};
+use crate::offline::shaders::{COMPAT, COMPAT_WITHOUT_TIME};
 use crate::renderer::memory::binding_limit;
-use crate::renderer::shaders::{COMPAT, COMPAT_WITHOUT_TIME};
 use crate::renderer::{GpuCapture, GpuError, Headless, ShaderChecks};
 use crate::scene::packed::encode::Bits;
 use crate::scene::{GaussianScene, SceneForm, TemporalFilter, Trained};

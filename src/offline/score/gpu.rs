@@ -4,9 +4,9 @@
 //! atomics, so that every run gives the same result.
 
 use super::{ScoreEngine, ScoreError, ViewScore, Want};
+use crate::offline::shaders::SHADERS;
 use crate::renderer::bind::{Bind, group_layout, pipeline};
 use crate::renderer::memory::{Allocator, binding_limit};
-use crate::renderer::shaders::module;
 use crate::renderer::{GpuCapture, GpuContext, GpuError, Headless, ShaderChecks, layout};
 use crate::scene::RuntimeScene;
 use crate::view::{Background, View};
@@ -55,7 +55,7 @@ impl Scorer {
             &[frame, Bind::Read, Bind::Read, Bind::Read, Bind::Read, Bind::Read, Bind::Read, Bind::Read, Bind::Texture],
         );
         let outputs = group_layout(device, "gs4d score outputs", &[Bind::Write, Bind::Write, Bind::Write]);
-        let shader = module(device, "score", &[], checks)?;
+        let shader = SHADERS.module(device, "score", &[], checks)?;
         let pipeline = |entry| pipeline(device, &shader, entry, &[&inputs, &outputs].map(Some));
         Ok(Self {
             place: pipeline("place"),

@@ -1,4 +1,4 @@
-//! `score`: the contribution of each Gaussian to a picture; CPU reference of `shaders/score.wgsl`.
+//! `score`: the contribution of each Gaussian to a picture; CPU reference of `shaders/offline/score.wgsl`.
 //!
 //! In: a scene, a view, the background. Out: [`ViewScore`], sums over the picture's pixels for each Gaussian. With `c =
 //! α T` where a Gaussian was blended into a pixel (after the tests of [`blend`](crate::reference::blend())), these are

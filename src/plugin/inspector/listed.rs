@@ -46,13 +46,13 @@ impl Listed for DebugView {
 }
 
 impl Listed for Design {
-    const ALL: &'static [Self] = &[Self::Auto, Self::Fast, Self::Reference];
+    const ALL: &'static [Self] = &[Self::Auto, Self::TileBins, Self::GlobalSort];
 
     fn name(self) -> &'static str {
         match self {
             Self::Auto => "auto",
-            Self::Fast => "fast",
-            Self::Reference => "reference",
+            Self::TileBins => "bins",
+            Self::GlobalSort => "sort",
         }
     }
 }

@@ -35,8 +35,8 @@ impl_reflect!(
     #[type_path = "bevy_gs4d::renderer"]
     enum Design {
         Auto,
-        Fast,
-        Reference,
+        TileBins,
+        GlobalSort,
     }
 );
 

@@ -8,11 +8,12 @@ use crate::renderer::capture::GpuCapture;
 use crate::renderer::design::Design;
 use crate::renderer::device::GpuContext;
 use crate::renderer::error::GpuError;
+use crate::renderer::global_sort::FinishedFrame;
 use crate::renderer::layout::Counters;
 use crate::renderer::memory::{Allocator, require_texture, with_room};
 use crate::renderer::pipelines::Renderer;
 use crate::renderer::shaders::{ColorPrecision, ShaderChecks, Storage};
-use crate::renderer::view::{FinishedFrame, Instance, ViewParameters, ViewRenderer, max_pairs};
+use crate::renderer::view::{Instance, ViewParameters, ViewRenderer, max_pairs};
 use crate::renderer::work::WorkCounters;
 use crate::scene::{RuntimeScene, TemporalFilter};
 use crate::view::{Appearance, Background, Counts, Frame, Picture, View};
@@ -186,7 +187,7 @@ impl Headless {
     /// As [`render`](Self::render), and if the pairs exceed the limits of the device.
     pub fn draw(&mut self, capture: &GpuCapture, view: &View, background: Background) -> Result<(), GpuError> {
         // Clients read the buffers of this design.
-        self.set_design(Design::Reference);
+        self.set_design(Design::GlobalSort);
         let parameters = ViewParameters { background, ..ViewParameters::default() };
         let instances = [instance(capture, None, view)];
         loop {
@@ -216,7 +217,7 @@ impl Headless {
         view: &View,
         background: Background,
     ) -> Result<(), GpuError> {
-        self.set_design(Design::Reference);
+        self.set_design(Design::GlobalSort);
         let active = self.take_active(capture, view.time);
         let parameters = ViewParameters { background, ..ViewParameters::default() };
         let instances = [instance(capture, active.as_ref(), view)];
@@ -258,7 +259,7 @@ impl Headless {
         self.active.as_ref().map_or(&self.renderer.no_list, |active| &active.list)
     }
 
-    /// Returns the resources of the last frame on the GPU; `None` before the first frame, and in [`Design::Fast`], which has other buffers.
+    /// Returns the resources of the last frame on the GPU; `None` before the first frame, and in [`Design::TileBins`], which has other buffers.
     pub fn finished(&self) -> Option<FinishedFrame<'_>> {
         self.view.finished()
     }
@@ -271,7 +272,7 @@ impl Headless {
         self.view.record(&self.renderer, &mut encoder, instances);
         queue.submit([encoder.finish()]);
         self.wait()?;
-        let (counters, offset) = self.view.counters();
+        let Some((counters, offset)) = self.view.counters() else { return Ok(Counters::default()) };
         let counters = self.copy_out_from(counters, offset, size_of::<Counters>() as u64)?;
         Ok(bytemuck::pod_read_unaligned(&counters))
     }

@@ -4,13 +4,13 @@
 //! uniforms and its bind groups. Frames without views of the previous frame have no motions.
 
 use super::parameters::Instance;
-use super::resources::{Resources, pixel_group, texture_bytes};
+use super::resources::{DesignBuffers, Resources, pixel_group, texture_bytes};
 use crate::renderer::layout::{
     BACKGROUND_NONE, DEBUG_COLOR, FrameUniforms, INSTANCE_STRIDE, INSTANCES_BOUND, MotionUniforms,
 };
 use crate::renderer::memory::Allocator;
 use crate::renderer::pipelines::Renderer;
-use crate::renderer::shaders::FastVariant;
+use crate::renderer::tile_bins::BinVariant;
 use crate::view::View;
 use std::num::NonZeroU64;
 use wgpu::{BindingResource, BufferUsages};
@@ -30,13 +30,13 @@ pub(super) struct MotionResources {
     /// Opaque depth and environment map of the bind group of the pixels.
     opaque: wgpu::TextureView,
     environment: wgpu::Buffer,
-    /// The variant with which the fast design blends motions: without depths.
-    pub variant: FastVariant,
+    /// The variant with which tile bins blend motions: without depths.
+    pub variant: BinVariant,
 }
 
 impl MotionResources {
     /// Creates the target of motions, its uniforms and its bind groups.
-    pub(super) fn new(renderer: &Renderer, allocator: Allocator<'_>, made: &Resources, variant: FastVariant) -> Self {
+    pub(super) fn new(renderer: &Renderer, allocator: Allocator<'_>, made: &Resources, variant: BinVariant) -> Self {
         let parts = u64::from(made.sizes.parts) * u64::from(INSTANCE_STRIDE);
         let before = allocator.buffer("gs4d frame before", parts, BufferUsages::UNIFORM);
         let frame = allocator.buffer("gs4d frame of motions", size_of::<FrameUniforms>() as u64, BufferUsages::UNIFORM);
@@ -48,18 +48,10 @@ impl MotionResources {
         };
         let instance = uniform(&made.instances, INSTANCES_BOUND as usize);
         let uniforms = [instance, uniform(&before, size_of::<MotionUniforms>())];
-        let splats = made.buffers.splats.as_entire_binding();
-        let group = |index: usize, buffers: &[BindingResource<'_>]| {
-            let resources = [&uniforms[..], buffers].concat();
-            allocator.bind_group("gs4d motion", &renderer.layouts.motion[index], &resources)
-        };
-        let motion = match &made.fast {
-            Some(fast) => fast.bins.each_ref().map(|bins| {
-                let [bins, visible] = [bins, &fast.visible].map(wgpu::Buffer::as_entire_binding);
-                group(1, &[bins, visible, splats.clone(), fast.splat_colors.as_entire_binding()])
-            }),
-            None => {
-                let group = group(0, &[made.buffers.depth_keys.as_entire_binding(), splats]);
+        let motion = match &made.buffers {
+            DesignBuffers::TileBins(buffers) => buffers.motion(allocator, &renderer.layouts, &uniforms),
+            DesignBuffers::GlobalSort(buffers) => {
+                let group = buffers.motion(allocator, &renderer.layouts, &uniforms);
                 [group.clone(), group]
             }
         };
@@ -74,7 +66,7 @@ impl MotionResources {
         renderer: &Renderer,
         allocator: Allocator<'_>,
         made: &Resources,
-        variant: FastVariant,
+        variant: BinVariant,
     ) {
         self.variant = variant;
         if self.opaque != made.opaque || self.environment != made.environment {

@@ -5,7 +5,8 @@
 
 use crate::renderer::active::ActiveList;
 use crate::renderer::capture::GpuCapture;
-use crate::renderer::shaders::{Blending, ColorPrecision};
+use crate::renderer::shaders::ColorPrecision;
+use crate::renderer::tile_bins::Blending;
 use crate::view::{Appearance, Background, BlendSpace, DebugView, View};
 use glam::UVec2;
 
@@ -25,7 +26,7 @@ pub struct Instance<'a> {
 
 impl Instance<'_> {
     /// Returns whether one dispatch can draw this instance and the next: both draw all Gaussians of the same capture, which has one part.
-    pub(super) fn joins(&self, next: &Self) -> bool {
+    pub(in crate::renderer) fn joins(&self, next: &Self) -> bool {
         let draws_all = self.active.is_none() && next.active.is_none();
         std::ptr::eq(self.capture, next.capture) && self.capture.parts.len() == 1 && draws_all
     }

@@ -2,19 +2,20 @@
 //!
 //! In: instances and [`ViewParameters`], and the counters of earlier frames. Out: a [`ViewRenderer`] that can be recorded.
 
-use super::bins;
-use super::loops;
 use super::motion::MotionResources;
 use super::parameters::{Instance, ViewParameters};
+use super::resources::Resources;
 use super::sizes::{Sizes, grown, max_pairs};
 use super::view_renderer::ViewRenderer;
 use crate::renderer::active::{drawn_count, most_drawn};
 use crate::renderer::design::Design;
 use crate::renderer::error::GpuError;
+use crate::renderer::global_sort;
 use crate::renderer::layout::{self, BLOCK, Counters};
 use crate::renderer::memory::{binding_limit, require_texture};
 use crate::renderer::pipelines::Renderer;
-use crate::renderer::shaders::{FastVariant, Lists, Pixels};
+use crate::renderer::shaders::Pixels;
+use crate::renderer::tile_bins::{self, BinVariant, Lists};
 use crate::renderer::timing::{PassTime, PassTimer, WHOLE_FRAME};
 use crate::view::DebugView;
 use glam::UVec2;
@@ -27,8 +28,8 @@ const RELEASE_AFTER_IDLE_FRAMES: u32 = 120;
 fn check_slots(limits: &wgpu::Limits, design: Design, slots: usize) -> Result<(), GpuError> {
     let splat = size_of::<layout::SplatRecord>() as u64;
     let limit = match design {
-        Design::Reference => binding_limit(limits),
-        Design::Auto | Design::Fast => binding_limit(limits).min(u64::from(bins::MAX_SLOTS) * splat),
+        Design::GlobalSort => binding_limit(limits),
+        Design::Auto | Design::TileBins => binding_limit(limits).min(u64::from(tile_bins::MAX_SLOTS) * splat),
     };
     // The buffer of splats has the largest elements per slot.
     let needed = (slots as u64).next_multiple_of(u64::from(BLOCK)) * splat;
@@ -41,7 +42,7 @@ impl ViewRenderer {
     /// # Errors
     /// When the buffer of its splats would be larger than the device can bind.
     pub fn check_room(device: &wgpu::Device, most_drawn: usize) -> Result<(), GpuError> {
-        check_slots(&device.limits(), Design::Reference, most_drawn)
+        check_slots(&device.limits(), Design::GlobalSort, most_drawn)
     }
 
     /// Sizes the buffers for the instances and for the pairs that earlier frames counted, and writes the uniforms. Call
@@ -71,23 +72,23 @@ impl ViewRenderer {
         self.has_depths = parameters.depths;
         let joined = instances.chunk_by(Instance::joins);
         let drawn = joined.map(|joined| (joined[0].capture.storage, joined.len() > 1));
-        let writes_depths = if self.design == Design::Reference {
+        let writes_depths = if self.design == Design::GlobalSort {
             if renderer.is_software {
-                self.at_once = loops::at_once(slots).ok_or(GpuError::TooManySplats { slots })?;
+                self.at_once = global_sort::at_once(slots).ok_or(GpuError::TooManySplats { slots })?;
             }
-            renderer.passes.compile_reference(device, drawn, self.pixels, self.at_once)?;
+            renderer.passes.global_sort.compile(device, drawn, self.pixels, self.at_once)?;
             true
         } else {
-            let large_batches = bins::large_batches(&device.limits(), instances);
-            let lists = Lists::suiting(&device.limits(), self.fullest_bin);
-            let few_bins = bins::few_bins(picture, bins::bin_side(picture, total), total);
-            let wanted = FastVariant { few_bins, lists, blending, precision, large_batches };
-            self.variant = renderer.fast_variant(device, drawn, wanted)?;
+            let large_batches = tile_bins::large_batches(&device.limits(), instances);
+            let lists = Lists::suiting(&device.limits(), self.bins.fullest);
+            let few_bins = tile_bins::few_bins(picture, tile_bins::bin_side(picture, total), total);
+            let wanted = BinVariant { few_bins, lists, blending, precision, large_batches };
+            self.bins.variant = renderer.bin_variant(device, drawn, wanted)?;
             blending.writes_depths()
         };
         if std::mem::take(&mut self.recorded) {
-            self.odd = !self.odd;
-            self.frames = self.frames.wrapping_add(1);
+            self.bins.odd = !self.bins.odd;
+            self.bins.frames = self.bins.frames.wrapping_add(1);
         }
         let made = self.resources.as_ref().map(|resources| resources.sizes).unwrap_or_default();
         let limits = device.limits();
@@ -99,14 +100,14 @@ impl ViewRenderer {
         let guess = total.saturating_mul(2).min(slots.saturating_mul(6)).max(1 << 16);
         let most = max_pairs(device);
         let pairs = self.pairs_wanted.max(guess).min(most);
-        (self.picture, self.bin_side) = (picture, bins::bin_side(picture, total));
-        let in_bins = self.fullest_bin.saturating_mul(self.bin_count());
+        (self.picture, self.bins.side) = (picture, tile_bins::bin_side(picture, total));
+        let in_bins = self.bins.fullest.saturating_mul(self.bins.count(picture));
         self.short_of_room = self.statistics.pairs > most || in_bins > most / 2;
         let entries = |picture| match self.design {
-            Design::Reference => 0,
+            Design::GlobalSort => 0,
             // An entry has twice as many bytes as a pair.
-            Design::Auto | Design::Fast => {
-                self.bin_room.wanted().max(bins::first_guess(picture, self.bin_side, slots)).min(most / 2)
+            Design::Auto | Design::TileBins => {
+                self.bins.room.wanted().max(tile_bins::first_guess(picture, self.bins.side, slots)).min(most / 2)
             }
         };
         let needed = |picture| Sizes {
@@ -129,9 +130,19 @@ impl ViewRenderer {
                 made.bind_pixel(allocator, &renderer.layouts, &self.frame, opaque_view, environment_buffer);
             }
             _ => {
-                self.odd = false;
+                self.bins.odd = false;
                 self.motion = None;
-                self.resources = Some(self.make(device, queue, renderer, sizes, opaque_view, environment_buffer));
+                self.resources = Some(Resources::new(
+                    renderer,
+                    device,
+                    queue,
+                    self.design,
+                    sizes,
+                    self.pixels,
+                    &self.frame,
+                    opaque_view,
+                    environment_buffer,
+                ));
             }
         }
         let active =
@@ -160,9 +171,9 @@ impl ViewRenderer {
             let storages = instances.iter().map(|instance| instance.capture.storage);
             renderer.passes.compile_motion(device, storages, self.design)?;
             let color = ViewParameters { depths: false, debug: DebugView::Color, ..*parameters };
-            let mut variant = FastVariant { blending: color.blending(), ..self.variant };
-            if self.design == Design::Fast {
-                variant = renderer.fast_variant(device, std::iter::empty(), variant)?;
+            let mut variant = BinVariant { blending: color.blending(), ..self.bins.variant };
+            if self.design == Design::TileBins {
+                variant = renderer.bin_variant(device, std::iter::empty(), variant)?;
             }
             if let Some(made) = &self.resources {
                 let allocator = renderer.allocator(device);
@@ -212,8 +223,8 @@ impl ViewRenderer {
             let counters: Counters = bytemuck::pod_read_unaligned(&counters);
             self.statistics.visible = counters.visible;
             self.statistics.pairs = self.pair_count(&counters);
-            if self.design == Design::Fast {
-                self.fullest_bin = counters.pairs_wanted;
+            if self.design == Design::TileBins {
+                self.bins.fullest = counters.pairs_wanted;
             }
             self.make_room(&counters);
         }

@@ -2,11 +2,11 @@
 //!
 //! In: a prepared view and the instances for which it was prepared. Out: one compute pass, in the order of the table in [`crate::renderer`].
 
-use super::bins::{FastResources, stamps_repeat};
 use super::parameters::Instance;
+use super::resources::DesignBuffers;
 use super::view_renderer::ViewRenderer;
-use crate::renderer::layout::BIN_COUNTERS;
 use crate::renderer::pipelines::Renderer;
+use crate::renderer::recording::Recording;
 use crate::renderer::timing::PassTimer;
 
 impl ViewRenderer {
@@ -33,45 +33,28 @@ impl ViewRenderer {
         timer: Option<&PassTimer>,
     ) {
         let Some(made) = &self.resources else { return };
-        let fast = made.fast.as_ref();
-        if let Some(fast) = fast {
-            self.clear(encoder, fast);
+        if let DesignBuffers::TileBins(buffers) = &made.buffers {
+            buffers.clear(encoder, &self.bins, self.picture, self.slots);
         }
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: Some("gs4d"),
             timestamp_writes: timer.and_then(PassTimer::frame_writes),
         });
-        match fast {
-            Some(fast) => self.record_fast(renderer, made, fast, &mut pass, instances, timer),
-            None => self.record_reference(renderer, made, &mut pass, instances, timer),
+        let frame = Recording { renderer, instances, picture: self.picture, pixel: &made.pixel, timer };
+        match &made.buffers {
+            DesignBuffers::TileBins(buffers) => buffers.record(&frame, &mut pass, &self.bins, self.has_colors),
+            DesignBuffers::GlobalSort(buffers) => {
+                buffers.record(&frame, &mut pass, self.slots, self.pixels, self.at_once);
+            }
         }
-        self.record_motion(renderer, made, &mut pass, instances, timer);
+        self.record_motion(&frame, made, &mut pass);
         drop(pass);
-        if self.readback.is_idle() {
-            let (counters, offset) = self.counters();
+        if let Some((counters, offset)) = self.counters().filter(|_| self.readback.is_idle()) {
             let counters = counters.clone();
             self.readback.copy(encoder, &counters, offset);
             self.copied_from = self.generation;
         }
-        self.cleared_bins = self.bin_count();
+        self.bins.cleared = self.bins.count(self.picture);
         self.recorded = true;
-    }
-
-    /// Clears buffers of the fast design that the passes of earlier frames have not cleared.
-    fn clear(&self, encoder: &mut wgpu::CommandEncoder, fast: &FastResources) {
-        if self.cleared_bins != self.bin_count() {
-            // The previous frame has cleared only its own number of bins.
-            for bins in &fast.bins {
-                encoder.clear_buffer(bins, 0, None);
-            }
-        }
-        if self.slots == 0 {
-            // No workgroup of `project_bin` runs, which clears the last two counters for the next frame.
-            let first = u64::from(BIN_COUNTERS - 2) * 4;
-            encoder.clear_buffer(&fast.bins[usize::from(self.odd)], first, Some(8));
-        }
-        if stamps_repeat(self.frames) {
-            encoder.clear_buffer(&fast.visible, 0, None);
-        }
     }
 }

@@ -1,16 +1,19 @@
 //! The resources of a view whose sizes depend on the view or the captures, and the bind groups over them.
 //!
-//! In: buffers and textures. Out: [`Resources`], which are created again only when the sizes change. Another opaque depth or environment map
-//! replaces only the bind group of the pixels.
+//! In: sizes, the opaque depth and the environment map. Out: [`Resources`], which are created again only when the sizes change. Another opaque
+//! depth or environment map replaces only the bind group of the pixels.
 
-use super::bins::FastResources;
 use super::sizes::Sizes;
-use crate::renderer::layout::DIGIT_BITS;
+use crate::renderer::design::Design;
+use crate::renderer::global_sort::SortBuffers;
+use crate::renderer::layout::{INSTANCE_STRIDE, INSTANCES_AT_ONCE, INSTANCES_BOUND};
 use crate::renderer::layouts::Layouts;
 use crate::renderer::memory::Allocator;
+use crate::renderer::pipelines::Renderer;
 use crate::renderer::shaders::Pixels;
-use crate::view::tiles;
-use glam::UVec2;
+use crate::renderer::tile_bins::BinBuffers;
+use std::num::NonZeroU64;
+use wgpu::{BindingResource, BufferUsages, TextureFormat};
 
 /// Sized resources and the bind groups over them.
 #[derive(Debug)]
@@ -19,8 +22,6 @@ pub(super) struct Resources {
     /// Bytes of storage buffers and targets.
     pub bytes: u64,
     pub instances: wgpu::Buffer,
-    /// Buffers that later passes, such as `score`, can read.
-    pub buffers: PassBuffers,
     pub color: wgpu::Texture,
     pub color_view: wgpu::TextureView,
     pub depth: wgpu::Texture,
@@ -29,37 +30,77 @@ pub(super) struct Resources {
     pub opaque: wgpu::TextureView,
     pub environment: wgpu::Buffer,
     pub pixels: Pixels,
-    pub project: wgpu::BindGroup,
-    /// Bind groups of the steps: from the projected keys into the first pair of buffers, from the first into the second, and back.
-    pub sort_depth: [wgpu::BindGroup; 3],
-    pub sort_tiles: [wgpu::BindGroup; 2],
-    pub arguments: wgpu::BindGroup,
-    pub bin: wgpu::BindGroup,
-    pub ranges: wgpu::BindGroup,
     pub pixel: wgpu::BindGroup,
-    pub blend: wgpu::BindGroup,
-    /// Buffers and bind groups of the fast design.
-    pub fast: Option<FastResources>,
+    /// The buffers of the design.
+    pub buffers: DesignBuffers,
 }
 
-/// Storage buffers of a frame that a later pass can read.
+/// The buffers of the design of a view.
 #[derive(Debug)]
-pub struct PassBuffers {
-    /// First and last + 1 pair of each tile, two words each.
-    pub tile_ranges: wgpu::Buffer,
-    /// Splat of each pair, ordered by tile, then depth.
-    pub pair_splats: wgpu::Buffer,
-    /// One [`SplatRecord`](crate::renderer::layout::SplatRecord) for each slot.
-    pub splats: wgpu::Buffer,
-    /// Slots of the visible splats, by depth.
-    pub order: wgpu::Buffer,
-    /// First pair of each visible splat, by depth.
-    pub offsets: wgpu::Buffer,
-    /// Depth key of each slot; [`INVISIBLE`](crate::renderer::layout::INVISIBLE) for a slot without a splat.
-    pub depth_keys: wgpu::Buffer,
+pub(super) enum DesignBuffers {
+    TileBins(BinBuffers),
+    GlobalSort(SortBuffers),
 }
 
 impl Resources {
+    /// Creates the resources. `frame` is the uniform of the frame.
+    pub(super) fn new(
+        renderer: &Renderer,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        design: Design,
+        sizes: Sizes,
+        pixels: Pixels,
+        frame: &wgpu::Buffer,
+        opaque: wgpu::TextureView,
+        environment: wgpu::Buffer,
+    ) -> Self {
+        let allocator = renderer.allocator(device);
+        let layouts = &renderer.layouts;
+        // A binding at the last instance has the same length as at the first.
+        let instance_slots = u64::from(sizes.parts + INSTANCES_AT_ONCE - 1);
+        let instances =
+            allocator.buffer("gs4d instances", instance_slots * u64::from(INSTANCE_STRIDE), BufferUsages::UNIFORM);
+        let instance = BindingResource::Buffer(wgpu::BufferBinding {
+            buffer: &instances,
+            offset: 0,
+            size: NonZeroU64::new(u64::from(INSTANCES_BOUND)),
+        });
+        let (buffers, bytes) = match design {
+            Design::GlobalSort => {
+                let buffers = SortBuffers::new(allocator, queue, layouts, sizes, frame, instance);
+                let bytes = buffers.bytes;
+                (DesignBuffers::GlobalSort(buffers), bytes)
+            }
+            Design::Auto | Design::TileBins => {
+                let buffers = BinBuffers::new(allocator, layouts, sizes, frame, instance);
+                let bytes = buffers.bytes;
+                (DesignBuffers::TileBins(buffers), bytes)
+            }
+        };
+        let color = allocator.texture("gs4d color", sizes.picture, pixels.precision.format());
+        let depth = allocator.texture("gs4d depth", sizes.depths, TextureFormat::Rg32Float);
+        let color_view = color.create_view(&wgpu::TextureViewDescriptor::default());
+        let depth_view = depth.create_view(&wgpu::TextureViewDescriptor::default());
+        let views = [&opaque, &color_view, &depth_view];
+        let pixel = pixel_group(allocator, &layouts.pixel[pixels.index()], frame, &environment, views);
+        let bytes = bytes + texture_bytes(&color) + texture_bytes(&depth);
+        Self {
+            sizes,
+            bytes,
+            instances,
+            color,
+            color_view,
+            depth,
+            depth_view,
+            opaque,
+            environment,
+            pixels,
+            pixel,
+            buffers,
+        }
+    }
+
     /// Binds an opaque depth and an environment map, unless they are bound. While a window is resized, the depth texture changes in every
     /// frame.
     pub(super) fn bind_pixel(
@@ -87,7 +128,7 @@ pub(super) fn pixel_group(
     environment: &wgpu::Buffer,
     views: [&wgpu::TextureView; 3],
 ) -> wgpu::BindGroup {
-    let [opaque, color, depth] = views.map(wgpu::BindingResource::TextureView);
+    let [opaque, color, depth] = views.map(BindingResource::TextureView);
     let resources = [frame.as_entire_binding(), environment.as_entire_binding(), opaque, color, depth];
     allocator.bind_group("gs4d pixel", layout, &resources)
 }
@@ -96,10 +137,4 @@ pub(super) fn pixel_group(
 pub(super) fn texture_bytes(texture: &wgpu::Texture) -> u64 {
     let texel = texture.format().block_copy_size(None).unwrap_or(0);
     u64::from(texture.width()) * u64::from(texture.height()) * u64::from(texel)
-}
-
-/// Returns the number of steps of the sort by tile.
-pub(super) fn tile_steps(size: UVec2) -> u32 {
-    let tiles = tiles(size);
-    (u32::BITS - (tiles.x * tiles.y - 1).leading_zeros()).div_ceil(DIGIT_BITS)
 }

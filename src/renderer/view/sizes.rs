@@ -8,10 +8,10 @@ use glam::UVec2;
 
 /// The sizes of the resources of a view.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Sizes {
+pub(in crate::renderer) struct Sizes {
     pub slots: u32,
     pub pairs: u32,
-    /// Entries of all bins of the fast design together.
+    /// Entries of all tile bins together; 0 for the global sort.
     pub entries: u32,
     /// Number of instance uniforms.
     pub parts: u32,

@@ -1,8 +1,9 @@
-//! Counters and stamps of the fast design from frame to frame.
+//! Counters and stamps of tile bins from frame to frame.
 //!
 //! In: synthetic scenes, frames with and without Gaussians, counters that the tests write. Out: proof that a frame depends on no counter and no
 //! splat of an earlier frame. Skipped where there is no GPU.
 
+use super::resources::DesignBuffers;
 use super::{Instance, ViewParameters, ViewRenderer};
 use crate::gaussian::{Gaussian, Harmonics};
 use crate::renderer::capture::GpuCapture;
@@ -10,7 +11,8 @@ use crate::renderer::design::Design;
 use crate::renderer::device::GpuContext;
 use crate::renderer::layout::Counters;
 use crate::renderer::pipelines::Renderer;
-use crate::renderer::shaders::{Blending, FastVariant, Lists, ShaderChecks};
+use crate::renderer::shaders::ShaderChecks;
+use crate::renderer::tile_bins::{BinVariant, Blending, Lists, MAX_SLOTS};
 use crate::scene::RuntimeScene;
 use crate::view::{Appearance, Camera, RasterFov, View};
 use glam::{UVec2, Vec3};
@@ -56,7 +58,7 @@ impl Gpu {
 
     fn view(&self) -> ViewRenderer {
         let mut view = ViewRenderer::new(&self.context.device, &self.renderer);
-        view.set_design(&self.renderer, Design::Fast);
+        view.set_design(&self.renderer, Design::TileBins);
         view
     }
 
@@ -65,11 +67,11 @@ impl Gpu {
         let GpuContext { device, queue, .. } = &self.context;
         let instances = [Instance { capture, active: None, view: seen(time), appearance: Appearance::default() }];
         view.prepare(device, queue, &self.renderer, &instances, &ViewParameters::default()).expect("the frame fits");
-        assert_eq!(view.design(), Design::Fast, "the scene is small enough for every driver");
+        assert_eq!(view.design(), Design::TileBins, "the scene is small enough for every driver");
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         view.record(&self.renderer, &mut encoder, &instances);
         queue.submit([encoder.finish()]);
-        let (counters, offset) = view.counters();
+        let (counters, offset) = view.counters().expect("a prepared view");
         bytemuck::pod_read_unaligned(&self.read(size_of::<Counters>() as u64, |encoder, to| {
             encoder.copy_buffer_to_buffer(counters, offset, to, 0, to.size());
         }))
@@ -143,9 +145,10 @@ fn the_number_of_pairs_saturates() {
     let (capture, mut view) = (gpu.upload(crowd(500)), gpu.view());
     // The buffers have grown by then.
     let expected = [(); 6].map(|()| gpu.draw(&mut view, &capture, 0.0))[5];
-    let next = usize::from(!view.odd);
-    let counters =
-        view.resources.as_ref().and_then(|made| made.fast.as_ref()).expect("the fast design").bins[next].clone();
+    let next = 1 - view.bins.parity();
+    let made = view.resources.as_ref().expect("a prepared view");
+    let DesignBuffers::TileBins(buffers) = &made.buffers else { panic!("the view has tile bins") };
+    let counters = buffers.bins[next].clone();
     gpu.context.queue.write_buffer(&counters, 0, &(u32::MAX - 10).to_ne_bytes());
     let found = gpu.draw(&mut view, &capture, 0.0);
     assert_eq!(found, Counters { pairs: u32::MAX, ..expected }, "a count above 2^32 does not wrap");
@@ -170,7 +173,7 @@ fn splats_of_a_frame_with_the_same_stamp_are_not_drawn() {
     let mut view = gpu.view();
     assert_eq!(gpu.draw(&mut view, &capture, 0.0).visible, 6_000, "all are present at time 0");
     // As after 65,534 more frames. The bins are still too small for the splats, so that tiles search them.
-    view.frames = 0xfffe;
+    view.bins.frames = 0xfffe;
     gpu.draw(&mut view, &capture, 1.0);
     let found = gpu.picture(&view);
     let apart = found.iter().zip(&expected).flat_map(|(a, b)| a.iter().zip(b).map(|(a, b)| (a - b).abs()));
@@ -181,7 +184,7 @@ fn splats_of_a_frame_with_the_same_stamp_are_not_drawn() {
 #[test]
 fn the_design_of_a_view_suits_the_number_of_splats() {
     let Some(gpu) = gpu() else { return };
-    let most = super::bins::MAX_SLOTS as usize;
+    let most = MAX_SLOTS as usize;
     let software = gpu.renderer.is_software;
     let mut view = ViewRenderer::new(&gpu.context.device, &gpu.renderer);
     let mut chosen = |wanted, slots| {
@@ -192,13 +195,13 @@ fn the_design_of_a_view_suits_the_number_of_splats() {
     let auto = gpu.renderer.resolve(Design::Auto);
     assert_eq!(chosen(Design::Auto, 1_000), auto, "the design of the device");
     assert_eq!(chosen(Design::Auto, most), auto, "bins can number this many splats");
-    assert_eq!(chosen(Design::Auto, most + 1), Design::Reference, "bins cannot number this many splats");
+    assert_eq!(chosen(Design::Auto, most + 1), Design::GlobalSort, "bins cannot number this many splats");
     assert_eq!(chosen(Design::Auto, 1_000), auto, "the design of the device again");
-    assert_eq!(chosen(Design::Reference, 1_000), Design::Reference, "the design that is set");
-    assert_eq!(chosen(Design::Fast, 1_000), Design::Fast, "the design that is set");
-    let crowded = if software { Design::Reference } else { Design::Fast };
-    assert_eq!(chosen(Design::Fast, 1_000_000), crowded, "software drivers end the loops over so many splats");
-    assert_eq!(chosen(Design::Fast, 1_000), Design::Fast, "fewer splats again");
+    assert_eq!(chosen(Design::GlobalSort, 1_000), Design::GlobalSort, "the design that is set");
+    assert_eq!(chosen(Design::TileBins, 1_000), Design::TileBins, "the design that is set");
+    let crowded = if software { Design::GlobalSort } else { Design::TileBins };
+    assert_eq!(chosen(Design::TileBins, 1_000_000), crowded, "software drivers end the loops over so many splats");
+    assert_eq!(chosen(Design::TileBins, 1_000), Design::TileBins, "fewer splats again");
 }
 
 #[test]
@@ -209,27 +212,27 @@ fn a_view_draws_with_another_variant_until_the_wanted_one_is_compiled() {
     let mut view = gpu.view();
     gpu.draw(&mut view, &capture, 0.5);
     let (device, drawn) = (&gpu.context.device, std::iter::once((capture.storage, false)));
-    let compiled = view.variant;
-    let wanted = FastVariant { lists: Lists::Short, large_batches: !compiled.large_batches, ..compiled };
+    let compiled = view.bins.variant;
+    let wanted = BinVariant { lists: Lists::Short, large_batches: !compiled.large_batches, ..compiled };
     assert_ne!(wanted, compiled, "another variant");
-    let variant = || gpu.renderer.fast_variant(device, drawn.clone(), wanted).expect("the passes compile");
+    let variant = || gpu.renderer.bin_variant(device, drawn.clone(), wanted).expect("the passes compile");
     assert_eq!(variant(), compiled, "the compiled variant draws the same picture");
     let start = Instant::now();
     while variant() != wanted {
         assert!(start.elapsed() < Duration::from_secs(300), "the wanted variant is compiled in the background");
         thread::sleep(Duration::from_millis(5));
     }
-    let surfaces = FastVariant { blending: Blending::ColorBehindSurfaces, ..wanted };
-    let found = gpu.renderer.fast_variant(device, drawn.clone(), surfaces).expect("the passes compile");
+    let surfaces = BinVariant { blending: Blending::ColorBehindSurfaces, ..wanted };
+    let found = gpu.renderer.bin_variant(device, drawn.clone(), surfaces).expect("the passes compile");
     assert_eq!(found, surfaces, "no compiled variant draws the same picture: the wanted one is compiled at once");
 }
 
 #[test]
 fn substitutes_draw_the_same_picture() {
     for few_bins in [false, true] {
-        let wanted = FastVariant { few_bins, blending: Blending::ColorBehindSamples, ..FastVariant::default() };
-        let substitutes: Vec<FastVariant> = wanted.substitutes().collect();
-        let same = |other: &FastVariant| (other.blending, other.precision) == (wanted.blending, wanted.precision);
+        let wanted = BinVariant { few_bins, blending: Blending::ColorBehindSamples, ..BinVariant::default() };
+        let substitutes: Vec<BinVariant> = wanted.substitutes().collect();
+        let same = |other: &BinVariant| (other.blending, other.precision) == (wanted.blending, wanted.precision);
         assert!(substitutes.iter().all(same), "the surfaces and targets are those of the view: {substitutes:?}");
         let few = substitutes.iter().any(|other| other.few_bins);
         assert_eq!(few, few_bins, "counters for few bins have no room for many: {substitutes:?}");

@@ -3,13 +3,11 @@
 //! In: a prepared view, its instances, its parameters and the environment map. Out: the uniform buffers of the frame, of the parts of its
 //! instances and of its motions.
 
-use super::bins;
-use super::fast;
 use super::parameters::{Instance, ViewParameters};
-use super::sizes::Sizes;
 use super::view_renderer::ViewRenderer;
 use crate::renderer::active::drawn_count;
 use crate::renderer::layout::{self, INSTANCE_STRIDE};
+use crate::renderer::tile_bins::per_thread;
 use crate::view::{Appearance, Background, View, tiles};
 
 impl ViewRenderer {
@@ -33,8 +31,8 @@ impl ViewRenderer {
             for (part_index, part) in instance.capture.parts.iter().enumerate() {
                 let count = drawn_count(instance.capture, part_index, instance.active);
                 let listed = u32::from(instance.active.is_some());
-                let binning = self.binning(&made.sizes, index);
-                let per_thread = fast::per_thread(count);
+                let binning = self.bins.uniform(&made.sizes, self.picture, index);
+                let per_thread = per_thread(count);
                 let uniform = layout::InstanceUniforms {
                     first_slot: slot,
                     count,
@@ -88,17 +86,12 @@ impl ViewRenderer {
             // A depth of two capture units.
             debug_depth: 2.0 * view.world_to_camera.row(2).truncate().length(),
             environment_opacity: appearance.opacity.clamp(0.0, 1.0),
-            binning: self.binning(&made.sizes, 0),
+            binning: self.bins.uniform(&made.sizes, self.picture, 0),
         };
         queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));
         if let Some(motion) = &self.motion {
             motion.write(queue, &frame, instances, parameters.previous.unwrap_or_default());
         }
         self.instance_uniforms = uniforms;
-    }
-
-    /// Returns the uniform `binning` of a part in the prepared frame.
-    fn binning(&self, sizes: &Sizes, part: u32) -> [u32; 4] {
-        [self.bin_side | (bins::stamp(self.frames) << 8), sizes.entries / self.bin_count(), part, sizes.parts]
     }
 }

@@ -2,16 +2,16 @@
 //!
 //! In: a device and a [`Renderer`]. Out: [`ViewRenderer`] with its settings and results. `prepare` and `record` fill and record the frame.
 
-use super::bins::{self, BinRoom};
-use super::loops::{self, Crowd};
 use super::motion::MotionResources;
 use super::readback::Readback;
-use super::resources::{PassBuffers, Resources};
+use super::resources::{DesignBuffers, Resources};
 use crate::renderer::design::Design;
-use crate::renderer::layout::{self, BIN_COUNTERS, Counters, DEPTH_STEPS, INSTANCE_STRIDE};
+use crate::renderer::global_sort::{AtOnce, FinishedFrame};
+use crate::renderer::layout::{self, BIN_COUNTERS, Counters};
 use crate::renderer::pipelines::Renderer;
-use crate::renderer::shaders::{AtOnce, FastVariant, Lists, Pixels};
+use crate::renderer::shaders::Pixels;
 use crate::renderer::statistics::ViewStatistics;
+use crate::renderer::tile_bins::{BinRoom, BinState};
 use crate::renderer::timing::PassTimer;
 use glam::UVec2;
 use wgpu::{BufferUsages, TextureFormat};
@@ -19,10 +19,9 @@ use wgpu::{BufferUsages, TextureFormat};
 /// Working buffers, uniforms and targets of one view.
 #[derive(Debug)]
 pub struct ViewRenderer {
-    /// Number of slots of the frame prepared last, the size of its picture, and the tiles along each side of its bins.
+    /// Number of slots of the frame prepared last, and the size of its picture.
     pub(super) slots: u32,
     pub(super) picture: UVec2,
-    pub(super) bin_side: u32,
     /// The design as set, and the design of the frame prepared last, which is never [`Design::Auto`].
     pub(super) wanted: Design,
     pub(super) design: Design,
@@ -34,34 +33,23 @@ pub struct ViewRenderer {
     /// Number of releases of the buffers, and the value that it had when the counters that are read back were copied.
     pub(super) generation: u32,
     pub(super) copied_from: u32,
-    /// Whether the counters of odd frames are used, and whether the frame prepared last has been recorded.
-    pub(super) odd: bool,
-    /// Number of frames that have been recorded.
-    pub(super) frames: u32,
+    /// The tile bins.
+    pub(super) bins: BinState,
+    /// Whether the frame prepared last has been recorded.
     pub(super) recorded: bool,
-    /// The variants of the pixel passes and of the passes of the fast design in the frame prepared last.
+    /// The variant of the pixel passes in the frame prepared last.
     pub(super) pixels: Pixels,
-    pub(super) variant: FastVariant,
-    /// Number of splats of the fullest bin of an earlier frame.
-    pub(super) fullest_bin: u32,
-    /// Number of bins that the frame recorded last has cleared for the next frame.
-    pub(super) cleared_bins: u32,
     pub(super) has_depths: bool,
     /// Whether colors of splats are computed.
     pub(super) has_colors: bool,
     /// Number of pairs that earlier frames need, and whether a frame exceeded the limits of the device.
     pub(super) pairs_wanted: u32,
     pub(super) short_of_room: bool,
-    /// The wanted capacity of the bins of the fast design.
-    pub(super) bin_room: BinRoom,
     /// Number of successive frames for which the buffers have been far too large.
     pub(super) oversized_frames: u32,
     /// Bytes of the instance uniforms of a frame, kept to reuse the allocation.
     pub(super) instance_uniforms: Vec<u8>,
     pub(super) frame: wgpu::Buffer,
-    pub(super) steps: wgpu::Buffer,
-    pub(super) counters: wgpu::Buffer,
-    pub(super) arguments: wgpu::Buffer,
     pub(super) no_depth: wgpu::TextureView,
     pub(super) no_environment: wgpu::Buffer,
     pub(super) readback: Readback,
@@ -74,27 +62,6 @@ pub struct ViewRenderer {
     pub(super) motion: Option<MotionResources>,
 }
 
-/// Resources of a finished frame on the GPU, for further passes of clients: scoring, a backward pass.
-#[derive(Debug, Clone, Copy)]
-pub struct FinishedFrame<'a> {
-    /// Uniform buffer: one [`layout::FrameUniforms`].
-    pub frame: &'a wgpu::Buffer,
-    /// Uniform buffer: begins with one [`layout::InstanceUniforms`], of the first part of the first instance.
-    pub instances: &'a wgpu::Buffer,
-    /// Storage buffer: one [`layout::Counters`].
-    pub counters: &'a wgpu::Buffer,
-    /// Buffers that the passes have written. After a frame with motions, colors of splats are their motions.
-    pub buffers: &'a PassBuffers,
-    /// Color over the background and transmittance, `Rgba32Float`. May be larger than the picture, like the depth.
-    pub color: &'a wgpu::TextureView,
-    /// Expected and median depth, `Rg32Float`.
-    pub depth: &'a wgpu::TextureView,
-    /// Capacity of the buffers in splats.
-    pub slots: u32,
-    /// Capacity of the buffers in pairs.
-    pub pairs: u32,
-}
-
 impl ViewRenderer {
     /// Creates a view without size; [`prepare`](Self::prepare) sets it.
     pub fn new(device: &wgpu::Device, renderer: &Renderer) -> Self {
@@ -104,7 +71,6 @@ impl ViewRenderer {
         Self {
             slots: 0,
             picture: UVec2::ONE,
-            bin_side: 1,
             wanted: Design::Auto,
             design: renderer.resolve(Design::Auto),
             at_once: AtOnce::default(),
@@ -112,27 +78,19 @@ impl ViewRenderer {
             crowded: false,
             generation: 0,
             copied_from: 0,
-            odd: false,
-            frames: 0,
+            bins: BinState::default(),
             recorded: false,
             pairs_wanted: 0,
             short_of_room: false,
-            bin_room: BinRoom::default(),
             oversized_frames: 0,
             instance_uniforms: Vec::new(),
             frame: allocator.buffer("gs4d frame", size_of::<layout::FrameUniforms>() as u64, BufferUsages::UNIFORM),
-            steps: allocator.buffer("gs4d steps", u64::from(INSTANCE_STRIDE * 2 * DEPTH_STEPS), BufferUsages::UNIFORM),
-            counters: allocator.buffer("gs4d counters", counters, BufferUsages::STORAGE | BufferUsages::COPY_SRC),
-            arguments: allocator.buffer("gs4d arguments", 6 * 4, BufferUsages::STORAGE | BufferUsages::INDIRECT),
             no_depth: depth.create_view(&wgpu::TextureViewDescriptor::default()),
             no_environment: allocator.buffer("gs4d no environment", 16, BufferUsages::STORAGE),
             readback: Readback::new(allocator, "gs4d counter readback", counters),
             statistics: ViewStatistics::default(),
             timing: None,
             pixels: Pixels::default(),
-            variant: FastVariant::default(),
-            fullest_bin: 0,
-            cleared_bins: 0,
             has_depths: true,
             has_colors: true,
             resources: None,
@@ -178,30 +136,14 @@ impl ViewRenderer {
         }
     }
 
-    /// Sets the design with which the view is drawn from the next [`prepare`](Self::prepare) on. Default: [`Design::Auto`]. A change ends the
-    /// [measurement](Self::measure) of GPU time.
-    pub fn set_design(&mut self, renderer: &Renderer, design: Design) {
-        if self.wanted == design {
-            return;
-        }
-        self.wanted = design;
-        self.crowded = false;
-        let design = renderer.resolve(design);
-        if self.design != design {
-            self.design = design;
-            self.timing = None;
-            self.free();
-        }
-    }
-
-    /// Makes the fast design leave out the colors of splats, for clients that read depths alone. Transmittance and depths do not change;
-    /// colors are undefined. The reference design computes colors together with the splats, and still does.
+    /// Makes tile bins leave out the colors of splats, for clients that read depths alone. Transmittance and depths do not change;
+    /// colors are undefined. The global sort computes colors together with the splats, and still does.
     pub fn without_colors(self) -> Self {
         Self { has_colors: false, ..self }
     }
 
-    /// Returns the design with which the view is drawn: never [`Design::Auto`]. Frames that the fast design cannot draw are drawn with
-    /// [`Design::Reference`]: if the design is [`Design::Auto`], frames of more than 2²⁴ splats; on software drivers, frames of too many splats
+    /// Returns the design with which the view is drawn: never [`Design::Auto`]. Frames that tile bins cannot draw are drawn with
+    /// [`Design::GlobalSort`]: if the design is [`Design::Auto`], frames of more than 2²⁴ splats; on software drivers, frames of too many splats
     /// in a bin.
     pub fn design(&self) -> Design {
         self.design
@@ -222,14 +164,16 @@ impl ViewRenderer {
         self.motion.as_ref().map(|motion| (&motion.texture, self.picture))
     }
 
-    /// Returns the resources of the frame recorded last; `None` before the first [`prepare`](Self::prepare), and in [`Design::Fast`], which
+    /// Returns the resources of the frame recorded last; `None` before the first [`prepare`](Self::prepare), and in [`Design::TileBins`], which
     /// has other buffers.
     pub fn finished(&self) -> Option<FinishedFrame<'_>> {
-        self.resources.as_ref().filter(|made| made.fast.is_none()).map(|made| FinishedFrame {
+        let made = self.resources.as_ref()?;
+        let DesignBuffers::GlobalSort(sort) = &made.buffers else { return None };
+        Some(FinishedFrame {
             frame: &self.frame,
             instances: &made.instances,
-            counters: &self.counters,
-            buffers: &made.buffers,
+            counters: &sort.counters,
+            buffers: &sort.buffers,
             color: &made.color_view,
             depth: &made.depth_view,
             slots: made.sizes.slots,
@@ -247,8 +191,8 @@ impl ViewRenderer {
         if pairs > made.pairs / 4 * 3 {
             self.pairs_wanted = pairs.saturating_add(pairs / 2);
         }
-        if self.design == Design::Fast {
-            self.bin_room.note(counters.pairs_wanted.saturating_mul(self.bin_count()), made.entries);
+        if self.design == Design::TileBins {
+            self.bins.room.note(counters.pairs_wanted.saturating_mul(self.bins.count(self.picture)), made.entries);
         }
     }
 
@@ -257,7 +201,7 @@ impl ViewRenderer {
     pub(crate) fn make_room_of(&mut self, other: &Self) {
         let made = other.resources.as_ref().map(|made| made.sizes).unwrap_or_default();
         self.pairs_wanted = other.pairs_wanted.max(made.pairs);
-        self.bin_room = BinRoom::of(other.bin_room.wanted().max(made.entries));
+        self.bins.room = BinRoom::of(other.bins.room.wanted().max(made.entries));
     }
 
     /// Returns the capacity in pairs.
@@ -268,8 +212,8 @@ impl ViewRenderer {
     /// Returns the number of pairs of a frame with these counters, written or not.
     pub(crate) fn pair_count(&self, counters: &Counters) -> u32 {
         match self.design {
-            Design::Auto | Design::Fast => counters.pairs,
-            Design::Reference => counters.pairs_wanted,
+            Design::Auto | Design::TileBins => counters.pairs,
+            Design::GlobalSort => counters.pairs_wanted,
         }
     }
 
@@ -292,40 +236,9 @@ impl ViewRenderer {
         self.motion = None;
         self.pairs_wanted = 0;
         self.short_of_room = false;
-        self.bin_room = BinRoom::default();
-        self.fullest_bin = 0;
+        self.bins.room = BinRoom::default();
+        self.bins.fullest = 0;
         self.statistics = ViewStatistics::default();
-    }
-
-    /// Returns whether the last frame, which had these counters, may be incomplete because a software driver has ended loops early. If so, the
-    /// view is drawn with [`Design::Reference`] until it is [released](Self::release) or another design is set.
-    pub(in crate::renderer) fn must_draw_again(&mut self, renderer: &Renderer, counters: &Counters) -> bool {
-        let made = self.resources.as_ref().filter(|made| made.fast.is_some()).map(|made| made.sizes);
-        let Some(made) = made.filter(|_| renderer.is_software) else { return false };
-        let fullest = counters.pairs_wanted;
-        let searches = fullest > made.entries / self.bin_count() || counters.pairs > made.pairs;
-        self.crowded =
-            !loops::fast_is_complete(Crowd { slots: self.slots, fullest, searches, lists: self.variant.lists });
-        self.crowded
-    }
-
-    /// Chooses the design of a frame of at most `slots` splats.
-    pub(super) fn choose_design(&mut self, device: &wgpu::Device, renderer: &Renderer, slots: usize) {
-        let slots = u32::try_from(slots).unwrap_or(u32::MAX);
-        // Without counters the fullest bin may contain all splats.
-        let lists = Lists::suiting(&device.limits(), slots);
-        let at_worst = Crowd { slots, fullest: slots, searches: true, lists };
-        let unsafe_loops =
-            renderer.is_software && (self.crowded || !(self.draws_again || loops::fast_is_complete(at_worst)));
-        let design = match (self.wanted, renderer.resolve(self.wanted)) {
-            (Design::Auto, _) if slots > bins::MAX_SLOTS => Design::Reference,
-            (_, Design::Fast) if unsafe_loops => Design::Reference,
-            (_, resolved) => resolved,
-        };
-        if self.design != design {
-            self.design = design;
-            self.free();
-        }
     }
 
     /// Returns the names of the passes that are timed.
@@ -333,21 +246,14 @@ impl ViewRenderer {
         self.design.timed_passes(self.motion.is_some())
     }
 
-    /// Returns the number of bins across and down the picture that is prepared.
-    pub(super) fn bin_grid(&self) -> UVec2 {
-        bins::bin_grid(self.picture, self.bin_side)
-    }
-
-    /// Returns the number of bins of the picture that is prepared.
-    pub(super) fn bin_count(&self) -> u32 {
-        self.bin_grid().element_product()
-    }
-
-    /// Returns the buffer of the counters of the frame prepared last, and their offset in bytes.
-    pub(in crate::renderer) fn counters(&self) -> (&wgpu::Buffer, u64) {
+    /// Returns the buffer of the counters of the frame prepared last, and their offset in bytes; `None` before the first
+    /// [`prepare`](Self::prepare).
+    pub(in crate::renderer) fn counters(&self) -> Option<(&wgpu::Buffer, u64)> {
         let first = u64::from(BIN_COUNTERS) * 4 - size_of::<Counters>() as u64;
-        let fast = self.resources.as_ref().and_then(|made| made.fast.as_ref());
-        // `sort_bins` writes them into the buffer of the next frame's counters.
-        fast.map_or((&self.counters, 0), |fast| (&fast.bins[usize::from(!self.odd)], first))
+        self.resources.as_ref().map(|made| match &made.buffers {
+            // `sort_bins` writes them into the buffer of the next frame's counters.
+            DesignBuffers::TileBins(bins) => (&bins.bins[1 - self.bins.parity()], first),
+            DesignBuffers::GlobalSort(sort) => (&sort.counters, 0),
+        })
     }
 }

@@ -1,7 +1,7 @@
 //! The change of a Gaussian by packing, so that training can draw a Gaussian that moves as if it were packed.
 //!
 //! In: a packed scene, the Gaussian that a record was encoded from. Out: its [`Rounding`], which maps that Gaussian to the decoded one, and
-//! a Gaussian close to it to one close to the decoded one. CPU reference of `shaders/rounding.wgsl`.
+//! a Gaussian close to it to one close to the decoded one. CPU reference of `shaders/offline/rounding.wgsl`.
 //!
 //! A difference is added to each attribute that may have any value. A shape is rotated and stretched instead: the difference of two
 //! covariances, added to the covariance of a flat Gaussian that has rotated a little since, would result in a negative variance.

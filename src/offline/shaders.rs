@@ -1,0 +1,45 @@
+//! The shaders of scoring and training.
+//!
+//! In: the name of a pass. Out: a naga module, or a wgpu shader module. They import the libraries of the renderer, so that they repeat no rule of
+//! its passes.
+
+use crate::renderer::shaders::ShaderSet;
+use wgpu::naga::valid::Capabilities;
+
+/// Libraries, each before the libraries that import it.
+const LIBRARIES: &[(&str, &str)] = &[
+    ("training", include_str!("../../shaders/offline/shared/training.wgsl")),
+    ("random", include_str!("../../shaders/offline/shared/random.wgsl")),
+    ("trained", include_str!("../../shaders/offline/shared/trained.wgsl")),
+    ("slice_backward", include_str!("../../shaders/offline/shared/slice_backward.wgsl")),
+    ("pairs", include_str!("../../shaders/offline/shared/pairs.wgsl")),
+];
+
+/// Passes by name.
+const PASSES: &[(&str, &str)] = &[
+    ("score", include_str!("../../shaders/offline/score.wgsl")),
+    ("slice", include_str!("../../shaders/offline/slice.wgsl")),
+    ("rounding", include_str!("../../shaders/offline/rounding.wgsl")),
+    ("loss", include_str!("../../shaders/offline/loss.wgsl")),
+    ("blend_backward", include_str!("../../shaders/offline/blend_backward.wgsl")),
+    ("project_backward", include_str!("../../shaders/offline/project_backward.wgsl")),
+    ("regularize", include_str!("../../shaders/offline/regularize.wgsl")),
+    ("codebooks", include_str!("../../shaders/offline/codebooks.wgsl")),
+    ("adam", include_str!("../../shaders/offline/adam.wgsl")),
+    ("dropout", include_str!("../../shaders/offline/dropout.wgsl")),
+    ("noise", include_str!("../../shaders/offline/noise.wgsl")),
+    ("relocate", include_str!("../../shaders/offline/relocate.wgsl")),
+];
+
+/// The passes of scoring and training.
+pub static SHADERS: ShaderSet =
+    ShaderSet::new(PASSES, LIBRARIES, &[(ATOMIC_SUMS, Capabilities::SHADER_FLOAT32_ATOMIC)]);
+
+/// Definitions of `blend_backward` and `project_backward` that reproduce the gradients of the original, including its deviations.
+pub const COMPAT: &[&str] = &["COMPAT"];
+
+/// Like [`COMPAT`], for captures whose color does not depend on time.
+pub const COMPAT_WITHOUT_TIME: &[&str] = &["COMPAT", "WITHOUT_TIME"];
+
+/// The definition of `blend_backward` and `project_backward` that sums by float atomics, for devices that support them.
+pub const ATOMIC_SUMS: &[&str] = &["ATOMIC_SUMS"];

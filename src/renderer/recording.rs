@@ -1,0 +1,80 @@
+//! What the passes of both designs have in common while a frame is recorded.
+//!
+//! In: a prepared view and its instances. Out: dispatches over the parts of instances and over tiles, and timestamps between passes.
+
+use super::active::drawn_count;
+use super::layout::{INSTANCE_STRIDE, INSTANCES_AT_ONCE};
+use super::pipelines::Renderer;
+use super::shaders::Storage;
+use super::timing::PassTimer;
+use super::view::Instance;
+use crate::view::tiles;
+use glam::UVec2;
+
+/// A frame that is recorded.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Recording<'a> {
+    pub renderer: &'a Renderer,
+    pub instances: &'a [Instance<'a>],
+    /// Size of the picture.
+    pub picture: UVec2,
+    /// Uniforms, background, opaque depth and targets of the pixels.
+    pub pixel: &'a wgpu::BindGroup,
+    /// Timestamps, if the frame is timed.
+    pub timer: Option<&'a PassTimer>,
+}
+
+impl Recording<'_> {
+    /// Marks the end of a pass, if the frame is timed.
+    pub(super) fn mark(&self, pass: &mut wgpu::ComputePass<'_>) {
+        if let Some(timer) = self.timer {
+            timer.mark(pass);
+        }
+    }
+
+    /// Records one dispatch of `project`, `project_bin` or `colors` for each part of each instance, or for several consecutive instances of
+    /// the same Gaussians. `groups` returns the number of workgroups for a storage and a number of Gaussians; `pipeline` returns the pipeline
+    /// for a storage and one or (`true`) several instances.
+    pub(super) fn dispatch_parts<'a>(
+        &self,
+        pass: &mut wgpu::ComputePass<'_>,
+        pipeline: impl Fn(Storage, bool) -> Option<&'a wgpu::ComputePipeline>,
+        group: &wgpu::BindGroup,
+        groups: impl Fn(Storage, u32) -> u32,
+    ) {
+        let mut index = 0;
+        for joined in self.instances.chunk_by(Instance::joins) {
+            // Consecutive instances of the same Gaussians in one dispatch: wgpu inserts a barrier between two dispatches.
+            for batch in joined.chunks(INSTANCES_AT_ONCE as usize) {
+                let (instance, count) = (&batch[0], batch.len() as u32);
+                let Some(pipeline) = pipeline(instance.capture.storage, joined.len() > 1) else { continue };
+                pass.set_pipeline(pipeline);
+                pass.set_bind_group(2, instance.active.map_or(&self.renderer.no_list, |active| &active.list), &[]);
+                for (at, part) in instance.capture.parts.iter().enumerate() {
+                    pass.set_bind_group(0, group, &[index * INSTANCE_STRIDE]);
+                    pass.set_bind_group(1, &part.geometry, &[]);
+                    pass.set_bind_group(3, &part.color, &[]);
+                    let gaussians = drawn_count(instance.capture, at, instance.active);
+                    pass.dispatch_workgroups(groups(instance.capture.storage, gaussians), 1, count);
+                    // Instances that are drawn together have one part.
+                    index += count;
+                }
+            }
+        }
+    }
+
+    /// Records `blend` or `blend_blocks`: a workgroup for each tile, which reads the lists of its tile.
+    pub(super) fn dispatch_tiles(
+        &self,
+        pass: &mut wgpu::ComputePass<'_>,
+        pipeline: &wgpu::ComputePipeline,
+        lists: &wgpu::BindGroup,
+    ) {
+        let tiles = tiles(self.picture);
+        pass.set_pipeline(pipeline);
+        pass.set_bind_group(0, self.pixel, &[]);
+        pass.set_bind_group(1, lists, &[]);
+        pass.dispatch_workgroups(tiles.x, tiles.y, 1);
+        self.mark(pass);
+    }
+}

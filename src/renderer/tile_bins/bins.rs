@@ -1,0 +1,146 @@
+//! The sizes of bins, and the variants that depend on them.
+//!
+//! In: the size of a picture, the number of Gaussians. Out: the size of bins in tiles, their initial capacity, the variants of the passes.
+
+use super::variant::FEW_BINS_LIMIT;
+use crate::renderer::view::Instance;
+use crate::view::tiles;
+use glam::UVec2;
+
+/// Up to [`SMALL_BINS`] bins of 2 x 2 tiles, small bins are faster: bins of 4 x 4 tiles would be too few to occupy a GPU. With more than
+/// [`CROWD`] Gaussians per large bin, large bins are too long to be sorted at once, and the limit is [`SMALL_BINS_OF_CROWD`], the number of
+/// bins that a workgroup of `project_bin` counts in workgroup memory.
+const SMALL_BINS: u32 = 1024;
+const CROWD: u32 = 1 << 14;
+const SMALL_BINS_OF_CROWD: u32 = 2048;
+/// From [`FEW_LARGE_BINS`] bins of 4 x 4 tiles on, large bins occupy a GPU if they have at most [`FEW_GAUSSIANS`] Gaussians each.
+const FEW_LARGE_BINS: u32 = 128;
+const FEW_GAUSSIANS: u32 = 300;
+
+/// Tiles along each side of small and of large bins.
+pub(super) const SIDES: [u32; 2] = [2, 4];
+
+/// Returns the number of tiles along each side of a bin, 2 or 4, for a picture size and a number of Gaussians.
+pub(in crate::renderer) fn bin_side(picture: UVec2, gaussians: u32) -> u32 {
+    let [small, large] = SIDES.map(|side| bin_grid(picture, side).element_product());
+    let each = gaussians / large;
+    let enough_large = large >= FEW_LARGE_BINS && each <= FEW_GAUSSIANS;
+    let limit = if each > CROWD { SMALL_BINS_OF_CROWD } else { SMALL_BINS };
+    if enough_large || small > limit { 4 } else { 2 }
+}
+
+/// Number of Gaussians from which on `project_bin` is faster if more of its workgroups run at the same time.
+const CROWDED: u32 = 1 << 20;
+
+/// Returns whether `project_bin` uses the variant with few counters of bins, so that more of its workgroups run at the same time.
+pub(in crate::renderer) fn few_bins(picture: UVec2, side: u32, gaussians: u32) -> bool {
+    gaussians >= CROWDED && bin_grid(picture, side).element_product() <= FEW_BINS_LIMIT
+}
+
+/// Returns the number of bins across and down a picture.
+pub(super) fn bin_grid(picture: UVec2, side: u32) -> UVec2 {
+    tiles(picture).map(|tiles| tiles.div_ceil(side))
+}
+
+/// The largest number of slots that fits into the bits of a bin entry.
+pub(in crate::renderer) const MAX_SLOTS: u32 = 1 << 24;
+
+/// Frames after which stamps repeat. A stamp has 16 bits and is not 0, the stamp of a new buffer.
+const STAMPS: u32 = 0xffff;
+
+/// Returns the stamp of a frame, by which the shaders tell visible splats of this frame from older ones.
+pub(super) fn stamp(frame: u32) -> u32 {
+    frame % STAMPS + 1
+}
+
+/// Returns whether the stamps repeat from a frame on: splats with stamps of earlier frames must be cleared before it.
+pub(super) fn stamps_repeat(frame: u32) -> bool {
+    frame.is_multiple_of(STAMPS)
+}
+
+/// Pictures of up to this number of tiles do not occupy the GPU, so that large batches of `blend_blocks` are faster.
+const FEW_TILES: u32 = 1024;
+/// Workgroup memory of large batches, bytes.
+const LARGE_BATCHES_MEMORY: u32 = 32 * 1024;
+
+/// Returns whether `blend_blocks` uses large batches.
+pub(in crate::renderer) fn large_batches(limits: &wgpu::Limits, instances: &[Instance<'_>]) -> bool {
+    let few = instances.first().is_some_and(|instance| tiles(instance.view.size).element_product() <= FEW_TILES);
+    few && limits.max_compute_workgroup_storage_size >= LARGE_BATCHES_MEMORY
+}
+
+/// Initial capacity of a bin in splats: all Gaussians divided by [`FIRST_DIVISOR`], but at least [`FIRST_CAPACITY`] and at most
+/// [`FIRST_OF_TILE`] for each tile. Few bins of few captures exceed it.
+const FIRST_CAPACITY: u32 = 4096;
+const FIRST_DIVISOR: u32 = 16;
+const FIRST_OF_TILE: u32 = 1024;
+
+/// Returns the initial capacity in splats of all bins together, before any splats have been counted.
+pub(in crate::renderer) fn first_guess(picture: UVec2, side: u32, slots: u32) -> u32 {
+    let bins = bin_grid(picture, side).element_product();
+    let capacity = (slots / FIRST_DIVISOR).clamp(FIRST_CAPACITY, FIRST_OF_TILE * side * side);
+    bins.saturating_mul(slots.min(capacity).max(256))
+}
+
+/// Number of Gaussians of a part from which on each thread of `project_bin` processes two, and four Gaussians. If many Gaussians are absent,
+/// workgroups of more Gaussians are better utilized, but small parts need as many workgroups as possible.
+const MANY_GAUSSIANS: u32 = 1 << 18;
+const VERY_MANY_GAUSSIANS: u32 = 1 << 20;
+
+/// Returns the number of Gaussians per thread of `project_bin`.
+pub(in crate::renderer) fn per_thread(count: u32) -> u32 {
+    match count {
+        0..MANY_GAUSSIANS => 1,
+        MANY_GAUSSIANS..VERY_MANY_GAUSSIANS => 2,
+        VERY_MANY_GAUSSIANS.. => 4,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bins_are_small_if_large_bins_are_few_or_crowded() {
+        for (size, gaussians, side) in [
+            (400, 45_000, 2),
+            (800, 45_000, 4),
+            (800, 600_000, 2),
+            (1024, 3_000_000, 2),
+            (1200, 90_000, 4),
+            (1200, 10_000_000, 2),
+        ] {
+            assert_eq!(bin_side(UVec2::splat(size), gaussians), side, "{gaussians} Gaussians, {size} pixels");
+        }
+    }
+
+    #[test]
+    fn the_stamps_between_two_clears_are_distinct_and_not_zero() {
+        // Around the repetition of stamps, and of the 32-bit frame number.
+        for first in [0, u32::MAX - STAMPS - 10] {
+            let mut seen = std::collections::HashSet::new();
+            for step in 0..2 * STAMPS + 100 {
+                let frame = first.wrapping_add(step);
+                if stamps_repeat(frame) {
+                    seen.clear();
+                }
+                assert!(
+                    stamp(frame) > 0 && stamp(frame) <= 0xffff,
+                    "frame {frame}: the stamp has 16 bits and is not 0"
+                );
+                assert!(seen.insert(stamp(frame)), "frame {frame}: the stamp is not in use");
+            }
+        }
+    }
+
+    #[test]
+    fn many_gaussians_in_few_bins_are_counted_by_small_workgroups() {
+        for (size, gaussians, few) in
+            [(400, 45_000, false), (1352, 3_000_000, true), (1352, 600_000, false), (4096, 3_000_000, false)]
+        {
+            let picture = UVec2::new(size, size * 3 / 4);
+            let side = bin_side(picture, gaussians);
+            assert_eq!(few_bins(picture, side, gaussians), few, "{gaussians} Gaussians, {size} pixels");
+        }
+    }
+}

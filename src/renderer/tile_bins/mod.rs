@@ -1,0 +1,37 @@
+//! Tile bins: the fastest design, four dispatches in place of the global sorts.
+//!
+//! In: a prepared view. Out: its frame, the same picture as global sort draws, by these passes (shaders in `shaders/tile_bins/`):
+//!
+//! | pass | reads | writes |
+//! |---|---|---|
+//! | `project_bin` | active list, Gaussians | splats, list of the visible splats, unordered bins of a few tiles |
+//! | `sort_bins` | bins | pairs of each tile, in order of depth |
+//! | `colors` | visible splats, color coefficients | colors of splats |
+//! | `blend_blocks` | pairs, splats and their colors, opaque depth | color and transmittance, expected and median depth |
+//!
+//! Each bin is sorted by one workgroup, in workgroup memory. `blend_blocks` blends each tile in blocks of 8 x 4 pixels.
+//!
+//! If a frame has more splats or pairs than the buffers can hold, the entries of a bin, or the pairs of whole bins, are not written:
+//! `blend_blocks` searches all splats for the nearest splats of such a tile.
+
+mod bins;
+mod buffers;
+mod layouts;
+mod loops;
+mod passes;
+mod record;
+mod state;
+mod variant;
+
+pub(super) use bins::{MAX_SLOTS, bin_side, few_bins, first_guess, large_batches, per_thread};
+pub(super) use buffers::BinBuffers;
+pub(super) use layouts::BinLayouts;
+pub(super) use loops::{Crowd, is_complete};
+pub(super) use passes::BinPasses;
+pub(super) use state::{BinRoom, BinState};
+pub(super) use variant::BinVariant;
+pub use variant::{Blending, EIGHT_AT_ONCE, FEW_BINS, LARGE_BATCHES, Lists};
+
+/// Names of the timed passes of a frame, in order. The last two are the passes of motions.
+pub(super) const TIMED_PASSES: &[&str] =
+    &["project_bin", "sort_bins", "colors", "blend_blocks", "motion", "blend_blocks (motion)"];

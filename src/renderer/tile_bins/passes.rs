@@ -1,0 +1,115 @@
+//! The compiled passes of tile bins, each compiled when a view first needs it.
+//!
+//! In: a device, the variants that a view draws with. Out: pipelines; an error if the device refuses one, which is not kept.
+
+use super::variant::{BinVariant, FEW_BINS, Lists};
+use crate::renderer::compiler::Compiler;
+use crate::renderer::error::GpuError;
+use crate::renderer::shaders::Storage;
+use std::sync::{Arc, OnceLock};
+
+/// The passes of a device.
+#[derive(Debug)]
+pub(in crate::renderer) struct BinPasses {
+    compiler: Arc<Compiler>,
+    /// Indexed by whether there are few bins, by whether instances are copied, and by the storage of the capture (order of [`Storage::ALL`]).
+    project_bin: [[[OnceLock<wgpu::ComputePipeline>; 3]; 2]; 2],
+    /// Indexed by whether instances are copied, and by the storage.
+    colors: [[OnceLock<wgpu::ComputePipeline>; 3]; 2],
+    /// In the order of [`Lists::ALL`].
+    sort_bins: [OnceLock<wgpu::ComputePipeline>; 3],
+    /// By [`BinVariant::blend_index`].
+    blend_blocks: [OnceLock<wgpu::ComputePipeline>; BinVariant::BLENDS],
+}
+
+impl BinPasses {
+    /// Returns the passes of a device, none of them compiled.
+    pub(in crate::renderer) fn new(compiler: Arc<Compiler>) -> Self {
+        Self {
+            compiler,
+            project_bin: Default::default(),
+            colors: Default::default(),
+            sort_bins: Default::default(),
+            blend_blocks: Default::default(),
+        }
+    }
+
+    /// Compiles the passes that are not compiled yet, for these storages and for one or (`true`) several instances in a dispatch.
+    ///
+    /// # Errors
+    /// When a shader does not compile.
+    pub(in crate::renderer) fn compile(
+        &self,
+        device: &wgpu::Device,
+        drawn: impl Iterator<Item = (Storage, bool)>,
+        variant: BinVariant,
+    ) -> Result<(), GpuError> {
+        let compiler = &self.compiler;
+        let (layouts, own) = (&compiler.layouts, &compiler.layouts.tile_bins);
+        for (storage, batched) in drawn {
+            let [geometry, color] = &layouts.captures[storage as usize];
+            let (definitions, copied) = compiler.reading(storage, batched);
+            if self.project_bin(storage, batched, variant).is_none() {
+                let few = if variant.few_bins { FEW_BINS } else { &[] };
+                let groups = [&own.project_bin, geometry, &layouts.active].map(Some);
+                let made = compiler.pass(device, "project_bin", &[few, &definitions[..]].concat(), &groups)?;
+                self.project_bin[usize::from(variant.few_bins)][copied][storage as usize].get_or_init(|| made);
+            }
+            if self.colors(storage, batched).is_none() {
+                let groups = [Some(&own.colors), Some(geometry), None, Some(color)];
+                let made = compiler.pass(device, "colors", &definitions, &groups)?;
+                self.colors[copied][storage as usize].get_or_init(|| made);
+            }
+        }
+        let lists = variant.lists;
+        if self.sort_bins(lists).is_none() {
+            let definitions = [lists.definitions(), compiler.subgroups].concat();
+            let made = compiler.pass(device, "sort_bins", &definitions, &[Some(&own.sort_bins)])?;
+            self.sort_bins[lists as usize].get_or_init(|| made);
+        }
+        if self.blend_blocks(variant).is_none() {
+            let definitions = [&variant.blend_definitions(), compiler.subgroups].concat();
+            let groups = [&layouts.pixel[variant.pixels().index()], &own.blend_blocks].map(Some);
+            let made = compiler.pass(device, "blend_blocks", &definitions, &groups)?;
+            self.blend_blocks[variant.blend_index()].get_or_init(|| made);
+        }
+        Ok(())
+    }
+
+    /// Returns `project_bin` for this storage, for one or several instances in a dispatch, if it has been compiled.
+    pub(super) fn project_bin(
+        &self,
+        storage: Storage,
+        batched: bool,
+        variant: BinVariant,
+    ) -> Option<&wgpu::ComputePipeline> {
+        self.project_bin[usize::from(variant.few_bins)][self.compiler.copied(batched)][storage as usize].get()
+    }
+
+    /// Returns `colors` for this storage, for one or several instances in a dispatch, if it has been compiled.
+    pub(super) fn colors(&self, storage: Storage, batched: bool) -> Option<&wgpu::ComputePipeline> {
+        self.colors[self.compiler.copied(batched)][storage as usize].get()
+    }
+
+    /// Returns `sort_bins` for lists of this length, if it has been compiled.
+    pub(super) fn sort_bins(&self, lists: Lists) -> Option<&wgpu::ComputePipeline> {
+        self.sort_bins[lists as usize].get()
+    }
+
+    /// Returns `blend_blocks`, if it has been compiled.
+    pub(in crate::renderer) fn blend_blocks(&self, variant: BinVariant) -> Option<&wgpu::ComputePipeline> {
+        self.blend_blocks[variant.blend_index()].get()
+    }
+
+    /// Returns whether the passes are compiled for these storages and this variant.
+    pub(in crate::renderer) fn has(
+        &self,
+        mut drawn: impl Iterator<Item = (Storage, bool)>,
+        variant: BinVariant,
+    ) -> bool {
+        let reads = |(storage, batched)| {
+            self.project_bin(storage, batched, variant).is_some() && self.colors(storage, batched).is_some()
+        };
+        self.sort_bins(variant.lists).is_some() && self.blend_blocks(variant).is_some() && drawn.all(reads)
+    }
+}

@@ -1,0 +1,93 @@
+//! The passes of tile bins, from `project_bin` to `blend_blocks`.
+//!
+//! In: a prepared view. Out: the passes, recorded into the compute pass of the frame.
+//!
+//! `sort_bins` and `colors` do not depend on each other and run at the same time, if each frame has its own encoder: wgpu inserts a barrier
+//! between two passes of an encoder for each buffer that the second pass writes and an earlier pass used. Therefore the counters of even and
+//! odd frames are in separate buffers, and so are splats and their colors. The bins are sorted first, since `sort_bins` occupies few threads
+//! for a long time: `colors` uses the remaining threads.
+
+use super::bins::{per_thread, stamps_repeat};
+use super::buffers::BinBuffers;
+use super::state::BinState;
+use crate::renderer::layout::BIN_COUNTERS;
+use crate::renderer::recording::Recording;
+use crate::renderer::shaders::Storage;
+use glam::UVec2;
+
+/// Returns the number of splats per workgroup of `colors`, four threads per splat: `SPLATS` of the shader.
+fn colors_of_group(storage: Storage) -> u32 {
+    match storage {
+        Storage::Coded => 32,
+        Storage::Sliced | Storage::Packed => 64,
+    }
+}
+
+/// The largest number of workgroups of `colors`, which loop over the visible splats: enough to occupy any GPU.
+const COLOR_GROUPS: u32 = 8192;
+
+impl BinBuffers {
+    /// Clears what the passes of earlier frames have not cleared, before the compute pass of a frame with so many slots.
+    pub(in crate::renderer) fn clear(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        state: &BinState,
+        picture: UVec2,
+        slots: u32,
+    ) {
+        if state.cleared != state.count(picture) {
+            // The previous frame has cleared only its own number of bins.
+            for bins in &self.bins {
+                encoder.clear_buffer(bins, 0, None);
+            }
+        }
+        if slots == 0 {
+            // No workgroup of `project_bin` runs, which clears the last two counters for the next frame.
+            let first = u64::from(BIN_COUNTERS - 2) * 4;
+            encoder.clear_buffer(&self.bins[state.parity()], first, Some(8));
+        }
+        if stamps_repeat(state.frames) {
+            encoder.clear_buffer(&self.visible, 0, None);
+        }
+    }
+
+    /// Records the passes of a frame. `has_colors`: whether colors of splats are computed.
+    pub(in crate::renderer) fn record(
+        &self,
+        frame: &Recording<'_>,
+        pass: &mut wgpu::ComputePass<'_>,
+        state: &BinState,
+        has_colors: bool,
+    ) {
+        let passes = &frame.renderer.passes.tile_bins;
+        let parity = state.parity();
+        // project_bin
+        let pipeline = |storage, batched| passes.project_bin(storage, batched, state.variant);
+        let groups = |_, count: u32| count.div_ceil(256 * per_thread(count));
+        frame.dispatch_parts(pass, pipeline, &self.project_bin[parity], groups);
+        frame.mark(pass);
+
+        // sort_bins
+        let (Some(sort_bins), Some(blend_blocks)) =
+            (passes.sort_bins(state.variant.lists), passes.blend_blocks(state.variant))
+        else {
+            return;
+        };
+        let bins = state.grid(frame.picture);
+        pass.set_pipeline(sort_bins);
+        pass.set_bind_group(0, &self.sort_bins[parity], &[]);
+        pass.dispatch_workgroups(bins.x, bins.y, 1);
+        frame.mark(pass);
+
+        // colors
+        if has_colors {
+            let pipeline = |storage, batched| passes.colors(storage, batched);
+            let groups = |storage, count: u32| count.div_ceil(colors_of_group(storage)).min(COLOR_GROUPS);
+            frame.dispatch_parts(pass, pipeline, &self.colors[parity], groups);
+        }
+        frame.mark(pass);
+
+        // blend_blocks
+        frame.dispatch_tiles(pass, blend_blocks, &self.blend_blocks);
+    }
+}

@@ -1,0 +1,166 @@
+//! The variants of the passes of tile bins.
+//!
+//! In: the limits of a device, the number of Gaussians, the targets and surfaces of a view. Out: [`BinVariant`], and the shader definitions of
+//! its passes.
+
+use crate::renderer::shaders::{ColorPrecision, Pixels};
+
+/// Capacity of the list of splats that `sort_bins` sorts in workgroup memory. With a small capacity, more workgroups run at the same time;
+/// bins with more splats are sorted in rounds.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Lists {
+    /// 1280 splats, 256 threads: for every device.
+    #[default]
+    Short,
+    /// 2304 splats, 512 threads.
+    Medium,
+    /// 5120 splats, 512 threads.
+    Long,
+}
+
+impl Lists {
+    /// All lengths.
+    pub const ALL: [Self; 3] = [Self::Short, Self::Medium, Self::Long];
+
+    /// Returns the definitions of `sort_bins`.
+    pub fn definitions(self) -> &'static [&'static str] {
+        match self {
+            Self::Short => &[],
+            Self::Medium => &["MEDIUM_LISTS"],
+            Self::Long => &["LONG_LISTS"],
+        }
+    }
+
+    /// Returns the number of splats that `sort_bins` sorts at once, and its threads: `LIST` and `THREADS` of the shader.
+    pub(in crate::renderer) fn sizes(self) -> [u32; 2] {
+        match self {
+            Self::Short => [1280, 256],
+            Self::Medium => [2304, 512],
+            Self::Long => [5120, 512],
+        }
+    }
+
+    /// Returns an upper bound of the workgroup memory of `sort_bins` with these lists, bytes.
+    pub fn memory(self) -> u32 {
+        match self {
+            Self::Short => 16 * 1024,
+            Self::Medium => 32 * 1024,
+            Self::Long => 48 * 1024,
+        }
+    }
+
+    /// Returns the length that suits a device and the number of splats of the fullest bin.
+    pub(in crate::renderer) fn suiting(limits: &wgpu::Limits, fullest: u32) -> Self {
+        let memory = limits.max_compute_workgroup_storage_size;
+        let threads = limits.max_compute_workgroup_size_x.min(limits.max_compute_invocations_per_workgroup);
+        if threads < 512 || memory < Self::Medium.memory() {
+            Self::Short
+        } else if fullest <= 2304 || memory < Self::Long.memory() {
+            Self::Medium
+        } else {
+            Self::Long
+        }
+    }
+}
+
+/// Definitions of `blend_blocks` for small pictures.
+pub const LARGE_BATCHES: &[&str] = &["LARGE_BATCHES"];
+
+/// Definitions of `blend_blocks` for small pictures with [`Blending::Color`] and [`Blending::ColorBehindSurfaces`]: each thread processes more
+/// splats of its pixel at once, since few threads run.
+pub const EIGHT_AT_ONCE: &[&str] = &["LARGE_BATCHES", "EIGHT_AT_ONCE"];
+
+/// The outputs of `blend_blocks` and the opaque surfaces that it supports. If several variants can draw a picture, the results are the same;
+/// the first is the fastest.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Blending {
+    /// Color, without opaque surfaces.
+    Color,
+    /// Color, hidden by opaque surfaces.
+    ColorBehindSurfaces,
+    /// Color, hidden by opaque surfaces with several samples per pixel.
+    ColorBehindSamples,
+    /// Color and depths, opaque surfaces, every debug view.
+    #[default]
+    All,
+    /// Color and depths, multisampled opaque surfaces, every debug view.
+    AllMultisampled,
+}
+
+impl Blending {
+    /// All kinds.
+    pub const ALL: [Self; 5] =
+        [Self::Color, Self::ColorBehindSurfaces, Self::ColorBehindSamples, Self::All, Self::AllMultisampled];
+
+    /// Returns the definitions of `blend_blocks`.
+    pub fn definitions(self) -> &'static [&'static str] {
+        match self {
+            Self::Color => &[],
+            Self::ColorBehindSurfaces => &["OPAQUE"],
+            Self::ColorBehindSamples => &["OPAQUE", "MULTISAMPLED"],
+            Self::All => &["DEPTHS"],
+            Self::AllMultisampled => &["DEPTHS", "MULTISAMPLED"],
+        }
+    }
+
+    /// Returns whether depths are written.
+    pub(in crate::renderer) fn writes_depths(self) -> bool {
+        matches!(self, Self::All | Self::AllMultisampled)
+    }
+
+    /// Returns whether the opaque depth is multisampled.
+    pub(in crate::renderer) fn is_multisampled(self) -> bool {
+        matches!(self, Self::ColorBehindSamples | Self::AllMultisampled)
+    }
+}
+
+/// Definitions of `project_bin` for at most [`FEW_BINS_LIMIT`] bins.
+pub const FEW_BINS: &[&str] = &["FEW_BINS"];
+
+/// The number of counters of bins with [`FEW_BINS`].
+pub(super) const FEW_BINS_LIMIT: u32 = 512;
+
+/// The variants of the passes of a frame.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(in crate::renderer) struct BinVariant {
+    pub few_bins: bool,
+    pub lists: Lists,
+    pub blending: Blending,
+    pub precision: ColorPrecision,
+    pub large_batches: bool,
+}
+
+impl BinVariant {
+    /// Number of variants of `blend_blocks`.
+    pub(in crate::renderer) const BLENDS: usize = 4 * Blending::ALL.len();
+
+    /// Returns the index of its `blend_blocks`, below [`BLENDS`](Self::BLENDS).
+    pub(in crate::renderer) fn blend_index(self) -> usize {
+        (self.blending as usize * 2 + self.precision as usize) * 2 + usize::from(self.large_batches)
+    }
+
+    /// Returns the definitions of `blend_blocks`.
+    pub(in crate::renderer) fn blend_definitions(self) -> Vec<&'static str> {
+        let batches = match self.blending {
+            _ if !self.large_batches => &[],
+            Blending::Color | Blending::ColorBehindSurfaces => EIGHT_AT_ONCE,
+            _ => LARGE_BATCHES,
+        };
+        [self.blending.definitions(), self.precision.definitions(), batches].concat()
+    }
+
+    /// Returns the other variants that draw the same picture, perhaps not as fast: with lists of other lengths, counters for any number of bins,
+    /// batches of another size.
+    pub(in crate::renderer) fn substitutes(self) -> impl Iterator<Item = Self> {
+        let bins = if self.few_bins { &[true, false][..] } else { &[false] };
+        let lists = [self.lists].into_iter().chain(Lists::ALL);
+        let batches = [self.large_batches, !self.large_batches];
+        lists
+            .flat_map(move |lists| batches.map(|large_batches| Self { lists, large_batches, ..self }))
+            .flat_map(move |variant| bins.iter().map(move |&few_bins| Self { few_bins, ..variant }))
+    }
+
+    pub(in crate::renderer) fn pixels(self) -> Pixels {
+        Pixels { multisampled: self.blending.is_multisampled(), precision: self.precision }
+    }
+}
