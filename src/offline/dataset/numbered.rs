@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 pub(super) const FRAME_RATE: f64 = 30.0;
 
 /// Extensions of images.
-pub(super) const IMAGE_EXTENSIONS: [&str; 3] = ["png", "jpg", "jpeg"];
+pub(super) const IMAGE_EXTENSIONS: [&str; 4] = ["png", "jpg", "jpeg", "exr"];
 
 /// Returns whether a path ends in the extension of an image.
 pub(super) fn is_image(path: &Path) -> bool {

@@ -1,6 +1,6 @@
 //! One training view and its image.
 //!
-//! In: a camera at a time with the path of a PNG or JPEG. Out: a [`CoveredImage`] of the size of the camera, which can be laid over any
+//! In: a camera at a time with the path of a picture. Out: a [`CoveredImage`] of the size of the camera, which can be laid over any
 //! background. Over black it equals the image that the `dataloader` mode of the original evaluates against (section 5.3 of the 4DGS model).
 //! The in-memory mode of the original multiplies transparent images by alpha twice and is not reproduced.
 

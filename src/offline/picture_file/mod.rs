@@ -1,4 +1,4 @@
-//! Pictures on disk: the only place where PNG and JPEG files are decoded.
+//! Pictures on disk: the only place where PNG, JPEG and EXR files are decoded.
 //!
 //! In: a path, and the largest size that the picture may have. Out: the picture, or a [`PictureError`] that names the file, the reason and the
 //! remedy.
@@ -6,6 +6,7 @@
 //! The size is compared before decoding, so that a small file cannot take much time and memory. A JPEG must be complete, which its decoder does
 //! not check (`jpeg`).
 
+mod exr;
 mod huffman;
 mod jpeg;
 mod png;
@@ -35,7 +36,7 @@ pub enum PictureError {
         reason: io::Error,
     },
     /// The file is not a picture, or it is damaged.
-    #[error("{}: not a readable PNG or JPEG image: {}", .path.display(), .reason.to_string().trim_end())]
+    #[error("{}: not a readable PNG, JPEG or EXR image: {}", .path.display(), .reason.to_string().trim_end())]
     Format {
         /// The file.
         path: PathBuf,
@@ -82,7 +83,7 @@ pub fn size(path: &Path, largest: UVec2) -> Result<UVec2, PictureError> {
     checked_size(path, &decoder, largest)
 }
 
-/// Decodes a picture. The contents of the file determine its format, not its name.
+/// Decodes a picture, linear light to sRGB-encoded colors. The contents of the file determine its format, not its name.
 ///
 /// # Errors
 /// As [`size`], and a picture that is damaged or not complete.
@@ -101,7 +102,8 @@ pub fn open(path: &Path, largest: UVec2) -> Result<DynamicImage, PictureError> {
         return Err(failed(ImageError::Decoding(error)));
     }
     Limits::default().reserve(decoder.total_bytes()).map_err(failed)?;
-    DynamicImage::from_decoder(decoder).map_err(failed)
+    let image = DynamicImage::from_decoder(decoder).map_err(failed)?;
+    Ok(if format == Some(ImageFormat::OpenExr) { exr::displayed(image) } else { image })
 }
 
 /// Reads a file of limited length.

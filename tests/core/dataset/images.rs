@@ -11,7 +11,7 @@ use bevy_gs4d::offline::dataset::{
 };
 use bevy_gs4d::view::Camera;
 use glam::{UVec2, Vec3};
-use image::{GrayImage, RgbaImage};
+use image::{GrayImage, Rgba32FImage, RgbaImage};
 use serde_json::json;
 
 use super::{Folder, frame, noise, resolution_option, transforms, with};
@@ -177,6 +177,19 @@ fn view_of(folder: &Folder, image: &str, size: u32) -> TrainingView {
     let json = json!({"camera_angle_x": 0.8, "w": size, "h": size, "frames": [frame(image)]});
     let path = folder.write_json("transforms_test.json", &json);
     CameraFile::load(&path, &CameraOptions::default()).expect("a valid camera file").remove(0)
+}
+
+#[test]
+fn linear_light_of_exr_images_becomes_srgb_colors() {
+    let folder = Folder::new();
+    // Linear light multiplied by alpha: one half; one half behind a coverage of one half; more than white; a negative value and no number.
+    let texels = [[0.5, 0.5, 0.5, 1.0], [0.25, 0.25, 0.25, 0.5], [4.0, 1.0, 0.0, 1.0], [-1.0, f32::NAN, 0.002, 1.0]];
+    let image = Rgba32FImage::from_raw(2, 2, texels.concat()).expect("four texels");
+    image.save(folder.path().join("a.exr")).expect("the folder can be written to");
+    let loaded = view_of(&folder, "a.exr", 2).load_covered().expect("a valid image");
+    // Alpha of 128 of 255 is multiplied into the color, and the product truncated: 188 * 128 / 255.
+    let expected = [[188, 188, 188, 255], [94, 94, 94, 128], [255, 255, 0, 255], [0, 0, 7, 255]];
+    assert_eq!(loaded.texels, expected, "sRGB-encoded, within 0 and 1");
 }
 
 #[test]

@@ -142,7 +142,7 @@ pub static KINDS: [Kind; 15] = [
     },
     Kind {
         name: "pictures",
-        about: "training images and masks (PNG, JPEG), in both modes, and their size",
+        about: "training images and masks (PNG, JPEG, EXR), in both modes, and their size",
         extension: "png",
         share: 1,
         make: || Arc::new(pictures::Pictures::new()),

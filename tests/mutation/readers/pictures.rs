@@ -1,6 +1,6 @@
 //! Pictures.
 //!
-//! In: small PNG and JPEG files of several kinds, and raw pictures. Out: files whose chunks and segments have right lengths and checksums, with
+//! In: small PNG, JPEG and EXR files of several kinds, and raw pictures. Out: files whose chunks and segments have right lengths and checksums, with
 //! wrong sizes, tables and pixels; each is read as image and mask, in every way that training images are read.
 
 use super::{Outcome, Reader};
@@ -13,8 +13,9 @@ use bevy_gs4d::offline::dataset::{CameraFile, CameraOptions, TrainingView};
 use bevy_gs4d::offline::metrics::ImageMetrics;
 use bevy_gs4d::view::{Camera, Picture};
 use glam::{Mat4, UVec2, Vec3};
-use image::RgbImage;
 use image::codecs::jpeg::JpegEncoder;
+use image::codecs::openexr::OpenExrEncoder;
+use image::{DynamicImage, ExtendedColorType, ImageEncoder, RgbImage};
 use serde_json::json;
 use std::fs;
 use std::path::PathBuf;
@@ -28,6 +29,7 @@ pub struct Pictures {
     folder: TempDir,
     png: Vec<Vec<Chunk>>,
     jpeg: Vec<Vec<Segment>>,
+    exr: Vec<Vec<u8>>,
 }
 
 impl Pictures {
@@ -44,17 +46,32 @@ impl Pictures {
             JpegEncoder::new_with_quality(&mut file, 80).encode_image(&picture).expect("memory can be written to");
             jpeg::segments(&file)
         });
+        let exr = [(10, 7), (20, 14)].map(|(width, height)| {
+            let pixels: Vec<u8> = (0..width * height * 3).map(|_| random.bits() as u8).collect();
+            let picture = RgbImage::from_raw(width, height, pixels).expect("as many bytes as pixels need");
+            let light = DynamicImage::ImageRgb8(picture).into_rgba32f();
+            let mut file = std::io::Cursor::new(Vec::new());
+            let encoder = OpenExrEncoder::new(&mut file);
+            encoder
+                .write_image(bytemuck::cast_slice(&light), width, height, ExtendedColorType::Rgba32F)
+                .expect("memory can be written to");
+            file.into_inner()
+        });
         let pose = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 3], [0, 0, 0, 1]];
         let frame = json!({ "file_path": "picture.png", "transform_matrix": pose });
         let cameras = json!({ "camera_angle_x": 0.7, "frames": [frame] });
         fs::write(folder.path().join("cameras.json"), cameras.to_string()).expect("the folder can be written to");
-        Self { folder, png, jpeg: Vec::from(jpeg) }
+        Self { folder, png, jpeg: Vec::from(jpeg), exr: Vec::from(exr) }
     }
 }
 
 impl Reader for Pictures {
     fn input(&self, random: &mut Random) -> Vec<u8> {
-        let mut file = if random.one_in(2) {
+        let mut file = if random.one_in(4) {
+            let (mut file, other) = (random.pick(&self.exr).clone(), random.pick(&self.exr));
+            bytes::change(&mut file, other, random);
+            file
+        } else if random.one_in(2) {
             let (mut chunks, other) = (random.pick(&self.png).clone(), random.pick(&self.png));
             png::change(&mut chunks, other, random);
             png::file(&chunks)
