@@ -114,7 +114,7 @@ impl Blending {
     }
 }
 
-/// Definitions of `project_bin` for at most [`FEW_BINS_LIMIT`] bins.
+/// Definitions of `project_bin` for at most 512 bins.
 pub const FEW_BINS: &[&str] = &["FEW_BINS"];
 
 /// The number of counters of bins with [`FEW_BINS`].

@@ -37,16 +37,17 @@ impl Pictures {
     pub fn new() -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let mut random = Random::new(7);
+        // The camera expects squares: sizes that differ by one pixel are accepted.
         let kinds = [(2, 8), (6, 8), (0, 8), (3, 8), (4, 8), (0, 16), (2, 16), (0, 1), (3, 2)];
-        let png = Vec::from(kinds.map(|(color, depth)| png::picture(10, 7, color, depth, &mut random)));
-        let jpeg = [(16, 16), (17, 9)].map(|(width, height)| {
+        let png = Vec::from(kinds.map(|(color, depth)| png::picture(10, 9, color, depth, &mut random)));
+        let jpeg = [(16, 16), (17, 16)].map(|(width, height)| {
             let pixels = (0..width * height * 3).map(|_| random.bits() as u8).collect();
             let picture = RgbImage::from_raw(width, height, pixels).expect("as many bytes as pixels need");
             let mut file = Vec::new();
             JpegEncoder::new_with_quality(&mut file, 80).encode_image(&picture).expect("memory can be written to");
             jpeg::segments(&file)
         });
-        let exr = [(10, 7), (20, 14)].map(|(width, height)| {
+        let exr = [(10, 9), (20, 19)].map(|(width, height)| {
             let pixels: Vec<u8> = (0..width * height * 3).map(|_| random.bits() as u8).collect();
             let picture = RgbImage::from_raw(width, height, pixels).expect("as many bytes as pixels need");
             let light = DynamicImage::ImageRgb8(picture).into_rgba32f();
