@@ -3,6 +3,7 @@
 //! In: the error of a format. Out: a [`CodecError`], displayed as `PATH: reason`.
 
 use super::checkpoint::CheckpointError;
+use super::import::ImportError;
 use super::package::PackageError;
 use std::io;
 use std::path::PathBuf;
@@ -32,4 +33,7 @@ pub enum CodecErrorKind {
     /// A package that cannot be read or written.
     #[error(transparent)]
     Package(#[from] PackageError),
+    /// A file of another make that cannot be read.
+    #[error(transparent)]
+    Import(#[from] ImportError),
 }

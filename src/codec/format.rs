@@ -1,12 +1,15 @@
 //! The table of the file formats of captures.
 //!
-//! In: the first bytes or the name of a file. Out: its [`Format`], with the functions that read and write it. A further
-//! format is one new file in this folder and one row of [`FORMATS`]. The formats do not use the table.
+//! In: the [`Start`] or the name of a file. Out: its [`Format`], with the functions that read and write it. A further
+//! format is one new file in this folder or in `import` and one row of [`FORMATS`]. The formats do not use the table.
 
 use super::checkpoint;
 use super::error::CodecErrorKind;
+use super::import::source::Source;
+use super::import::{ImportError, Imported};
 use super::options::ReadOptions;
 use super::package::{self, PackageInfo, WriteSettings};
+use super::start::{Start, ZIP};
 use crate::scene::GaussianScene;
 use std::fs::File;
 use std::io::{BufReader, Write};
@@ -21,15 +24,24 @@ pub struct Format {
     pub name: &'static str,
     /// Extensions of its files, without the dot.
     pub extensions: &'static [&'static str],
-    /// The first bytes of each of its files.
-    pub magic: &'static [u8],
-    /// Reads a scene from the file at a path, which is open and positioned at its start.
-    pub read: fn(&Path, BufReader<File>, &ReadOptions) -> Result<GaussianScene, CodecErrorKind>,
+    /// Returns whether a file that starts so is of this format.
+    pub(crate) is_of: fn(&Start) -> bool,
+    /// Reads a scene.
+    pub(crate) read: Read,
     /// Writes a scene; `None` if the format is only read.
     pub write: Option<fn(&mut dyn Write, &GaussianScene, &WriteSettings) -> Result<(), CodecErrorKind>>,
     /// Verifies the checksums of a file without building the scene, and returns its header and the damaged sections;
     /// `None` if the files of the format have no sections.
     pub inspect: Option<fn(BufReader<File>) -> Result<PackageInfo, CodecErrorKind>>,
+}
+
+/// How a format is read.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Read {
+    /// From the file at a path, which is open and positioned at its start.
+    File(fn(&Path, BufReader<File>, &ReadOptions) -> Result<GaussianScene, CodecErrorKind>),
+    /// From its bytes in memory.
+    Bytes(fn(&Source<'_>, &ReadOptions) -> Result<Imported, ImportError>),
 }
 
 /// All formats.
@@ -38,8 +50,8 @@ pub const FORMATS: &[Format] = &[
         id: "checkpoint",
         name: "a checkpoint of the 4DGS trainer (.pth, a zip archive)",
         extensions: checkpoint::EXTENSIONS,
-        magic: &checkpoint::MAGIC,
-        read: read_checkpoint,
+        is_of: is_checkpoint,
+        read: Read::File(read_checkpoint),
         write: None,
         inspect: None,
     },
@@ -47,18 +59,17 @@ pub const FORMATS: &[Format] = &[
         id: "package",
         name: "a package (.gs4d)",
         extensions: package::EXTENSIONS,
-        magic: &package::MAGIC,
-        read: read_package,
+        is_of: is_package,
+        read: Read::File(read_package),
         write: Some(write_package),
         inspect: Some(inspect_package),
     },
 ];
 
 impl Format {
-    /// Returns the format of a file that starts with these bytes, of which [`longest_magic`] are enough; `None` if no
-    /// format does.
-    pub fn of_start(start: &[u8]) -> Option<Self> {
-        FORMATS.iter().copied().find(|format| start.starts_with(format.magic))
+    /// Returns the format of a file that starts so; `None` if no format does.
+    pub(crate) fn of(start: &Start) -> Option<Self> {
+        FORMATS.iter().copied().find(|format| (format.is_of)(start))
     }
 
     /// Returns whether a path ends in one of its extensions.
@@ -68,11 +79,6 @@ impl Format {
     }
 }
 
-/// Returns the largest number of first bytes by which a format is recognized.
-pub fn longest_magic() -> usize {
-    FORMATS.iter().map(|format| format.magic.len()).max().unwrap_or_default()
-}
-
 /// Returns the message about a file of no known format.
 pub(super) fn unknown() -> String {
     let names: Vec<&str> = FORMATS.iter().map(|format| format.name).collect();
@@ -80,6 +86,17 @@ pub(super) fn unknown() -> String {
         Some((last, others)) => format!("neither {} nor {last}", others.join(", ")),
         None => "of no known format".to_owned(),
     }
+}
+
+/// Returns whether a file is a checkpoint: a zip archive that has the pickle of a trainer, or that is damaged, so that its error is that of
+/// the most frequent archive.
+fn is_checkpoint(start: &Start) -> bool {
+    let has_pickle = start.entries.iter().any(|entry| entry.ends_with("data.pkl"));
+    start.bytes.starts_with(ZIP) && (start.entries.is_empty() || has_pickle)
+}
+
+fn is_package(start: &Start) -> bool {
+    start.bytes.starts_with(&package::MAGIC)
 }
 
 fn read_checkpoint(path: &Path, file: BufReader<File>, options: &ReadOptions) -> Result<GaussianScene, CodecErrorKind> {
@@ -113,13 +130,10 @@ mod tests {
     }
 
     #[test]
-    fn no_two_formats_have_the_same_magic_or_extension() {
+    fn no_two_formats_have_the_same_name_or_id() {
         for (index, format) in FORMATS.iter().enumerate() {
             for other in &FORMATS[index + 1..] {
-                let clash = format.magic.starts_with(other.magic) || other.magic.starts_with(format.magic);
-                assert!(!clash, "{} and {} differ in their first bytes", format.name, other.name);
-                let common = format.extensions.iter().any(|extension| other.extensions.contains(extension));
-                assert!(!common, "{} and {} differ in their extensions", format.name, other.name);
+                assert!(format.id != other.id && format.name != other.name, "{} is one format", format.name);
             }
         }
     }

@@ -2,38 +2,78 @@
 //!
 //! In: a path, and [`ReadOptions`] for settings that the file may not contain. Out: a [`GaussianScene`]; and back.
 //! `format` is the table of formats: [`checkpoint`] reads the files of the 4DGS trainer (`.pth`),
-//! [`package`] reads and writes the format of this crate (`.gs4d`).
+//! [`package`] reads and writes the format of this crate (`.gs4d`), `import` reads those of other makes.
 
 pub mod checkpoint;
 mod error;
 pub(crate) mod format;
+pub(crate) mod import;
 mod options;
 pub mod package;
+mod start;
 pub(crate) mod text;
 
 pub use error::{CodecError, CodecErrorKind};
+pub use import::ImportError;
 pub use options::{InvalidOption, ReadOptions};
 
 use crate::scene::GaussianScene;
 use format::FORMATS;
 pub use format::Format;
+use format::Read;
+use import::Imported;
+use import::source::{Beside, InFolder, Source};
 use package::{PackageInfo, WriteSettings};
+use start::Start;
 use std::fs::File;
-use std::io::{BufReader, Read, Seek, Write};
+use std::io::{BufReader, Cursor, Read as _, Write};
 use std::path::Path;
 
-/// Reads a capture. Its format follows from the first bytes of the file, not from its name. The format interprets the
-/// options; see [`ReadOptions`].
+/// Reads a capture. Its format follows from the contents of the file, not from its name, unless nothing in the file tells it. The format
+/// interprets the options; see [`ReadOptions`].
 ///
 /// # Errors
 /// A file that cannot be opened, is of an unknown format, or is damaged; options that are invalid or contradict the
 /// file.
 pub fn load(path: &Path, options: &ReadOptions) -> Result<GaussianScene, CodecError> {
+    Ok(load_stating(path, options)?.scene)
+}
+
+/// As [`load`], with what of the file the scene does not show.
+///
+/// # Errors
+/// As [`load`].
+pub(crate) fn load_stating(path: &Path, options: &ReadOptions) -> Result<Imported, CodecError> {
     let read = || {
-        let (format, file) = open(path)?;
-        (format.read)(path, file, options)
+        let (format, mut file) = open(path)?;
+        match format.read {
+            Read::File(read) => Ok(Imported { scene: read(path, file, options)?, lost: Vec::new() }),
+            Read::Bytes(read) => {
+                let mut bytes = Vec::new();
+                file.read_to_end(&mut bytes)?;
+                let folder = path.parent().unwrap_or(Path::new(""));
+                Ok(read(&Source { path, bytes: &bytes, beside: &InFolder(folder) }, options)?)
+            }
+        }
     };
     read().map_err(|kind| CodecError { path: path.to_owned(), kind })
+}
+
+/// Reads a capture of another make from bytes in memory.
+///
+/// # Errors
+/// Bytes of an unknown format, or of one that is read from files alone; as [`load`].
+pub(crate) fn read_bytes(
+    path: &Path,
+    bytes: &[u8],
+    beside: &dyn Beside,
+    options: &ReadOptions,
+) -> Result<Imported, CodecErrorKind> {
+    let start = Start::of(&mut Cursor::new(bytes), path)?;
+    match Format::of(&start).map(|format| format.read) {
+        Some(Read::Bytes(read)) => Ok(read(&Source { path, bytes, beside }, options)?),
+        Some(Read::File(_)) | None => Err(CodecErrorKind::UnknownFormat(format::unknown())),
+    }
 }
 
 /// Returns the format of a file. If the files of that format have sections, all checksums are verified, and the header
@@ -52,10 +92,8 @@ pub fn inspect(path: &Path) -> Result<(Format, Option<PackageInfo>), CodecError>
 /// Returns the format of a file, and the file at its start.
 fn open(path: &Path) -> Result<(Format, BufReader<File>), CodecErrorKind> {
     let mut file = BufReader::new(File::open(path)?);
-    let mut start = Vec::new();
-    file.by_ref().take(format::longest_magic() as u64).read_to_end(&mut start)?;
-    file.rewind()?;
-    let format = Format::of_start(&start).ok_or_else(|| CodecErrorKind::UnknownFormat(format::unknown()))?;
+    let start = Start::of(&mut file, path)?;
+    let format = Format::of(&start).ok_or_else(|| CodecErrorKind::UnknownFormat(format::unknown()))?;
     Ok((format, file))
 }
 

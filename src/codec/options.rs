@@ -3,7 +3,7 @@
 //! In: values from a command line or a loader's settings. Out: [`ReadOptions`] with valid values, which each format
 //! interprets; an [`InvalidOption`] for a value that is invalid or contradicts the file.
 
-use crate::gaussian::ShDirection;
+use crate::gaussian::{SMALLEST_CUTOFF, ShDirection};
 use crate::scene::{RotationConvention, TrainedCameras, UpAxis};
 use crate::view::RasterFov;
 use serde::{Deserialize, Serialize};
@@ -40,6 +40,13 @@ pub struct ReadOptions {
     /// Seconds of one pass through the time interval; 0 for a still. Default: the length of the interval, as if its unit
     /// were the second.
     pub duration_seconds: Option<f32>,
+    /// The marginal at and below which a Gaussian is not drawn, from 1/255 to below 1. Default: what the format has; 0.05 for checkpoints.
+    pub marginal_cutoff: Option<f32>,
+    /// Frames a second of a sequence of files. Default: 30.
+    pub fps: Option<f32>,
+    /// Largest distance between a curved path and the straight pieces that replace it, relative to the middle scale of the Gaussian.
+    /// Default: 0.25.
+    pub tolerance: Option<f32>,
 }
 
 /// An option whose value is invalid or contradicts the file.
@@ -78,6 +85,21 @@ impl ReadOptions {
             && !(seconds.is_finite() && seconds >= 0.0)
         {
             return refuse("duration", format!("{seconds} is not a number of seconds, zero or above"));
+        }
+        if let Some(cutoff) = self.marginal_cutoff
+            && !(SMALLEST_CUTOFF..1.0).contains(&cutoff)
+        {
+            return refuse("marginal cut-off", format!("{cutoff} is not from 1/255 to below 1"));
+        }
+        if let Some(fps) = self.fps
+            && !(fps.is_finite() && fps > 0.0)
+        {
+            return refuse("fps", format!("{fps} is not a positive number of frames a second"));
+        }
+        if let Some(tolerance) = self.tolerance
+            && !(tolerance.is_finite() && tolerance > 0.0)
+        {
+            return refuse("tolerance", format!("{tolerance} is not a positive part of a scale"));
         }
         Ok(())
     }

@@ -3,8 +3,11 @@
 //! In: a temporal mean and deviation, a time. Out: the marginal at that time; the limits below which a Gaussian is not
 //! drawn.
 
-/// A Gaussian is drawn only at times at which its marginal is above this value (strict, as in the original).
+/// A Gaussian is drawn only at times at which its marginal is above this value (strict, as in the original), unless its scene has another one.
 pub const MARGINAL_CUTOFF: f32 = 0.05;
+
+/// The smallest cut-off: a splat with a lower marginal has an alpha below 1/255, which is never drawn.
+pub const SMALLEST_CUTOFF: f32 = 1.0 / 255.0;
 
 /// Distance in time from the temporal mean at which the marginal falls to [`MARGINAL_CUTOFF`], in temporal deviations:
 /// sqrt(−2 ln 0.05) = 2.4477, rounded up.

@@ -3,7 +3,7 @@
 //! In: options of a command, `cfg_args`, or a package's header. Out: [`TrainedWith`] and [`PlaybackHints`], stored in every
 //! package so that drawing needs no options.
 
-use crate::gaussian::ShDirection;
+use crate::gaussian::{MARGINAL_CUTOFF, ShDirection};
 use crate::view::RasterFov;
 use serde::{Deserialize, Serialize};
 
@@ -27,6 +27,9 @@ pub struct TrainedWith {
     pub force_sh_3d: bool,
     /// Added to the temporal variance in the marginal, if positive. Default: −1, nothing is added.
     pub prefilter_var: f32,
+    /// The marginal at and below which a Gaussian is not drawn, from 1/255 to below 1. Default: 0.05.
+    #[serde(skip_serializing_if = "is_the_original_cutoff")]
+    pub marginal_cutoff: f32,
     /// Iteration of the checkpoint. Default: 0.
     pub iteration: u64,
     /// Extent of the training cameras, the factor of positional learning rates. Default: 1.
@@ -41,6 +44,11 @@ pub struct TrainedWith {
     pub validation: Option<String>,
 }
 
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_the_original_cutoff(cutoff: &f32) -> bool {
+    *cutoff == MARGINAL_CUTOFF
+}
+
 impl Default for TrainedWith {
     fn default() -> Self {
         Self {
@@ -52,6 +60,7 @@ impl Default for TrainedWith {
             sh_direction: ShDirection::Canonical,
             force_sh_3d: false,
             prefilter_var: -1.0,
+            marginal_cutoff: MARGINAL_CUTOFF,
             iteration: 0,
             spatial_lr_scale: 1.0,
             pixel: None,

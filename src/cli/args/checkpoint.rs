@@ -49,6 +49,16 @@ pub(crate) struct CheckpointArgs {
     /// interval's length].
     #[arg(long, value_name = "SECONDS", value_parser = values::seconds)]
     duration: Option<f32>,
+    /// Marginal at and below which a Gaussian is not drawn, 1/255 to 1; also instead of a package's own [default: what the format has, 0.05 for
+    /// checkpoints].
+    #[arg(long, value_name = "MARGINAL", value_parser = values::number)]
+    cutoff: Option<f32>,
+    /// Frames a second of a sequence of files [default: 30].
+    #[arg(long, value_name = "FPS", value_parser = values::number)]
+    fps: Option<f32>,
+    /// Largest distance between a curved path and the straight pieces that replace it, in middle scales of the Gaussian [default: 0.25].
+    #[arg(long, value_name = "SCALES", value_parser = values::number)]
+    tolerance: Option<f32>,
 }
 
 const ROTATION_CONVENTIONS: [(&str, RotationConvention); 2] =
@@ -69,7 +79,7 @@ const UP_AXES: [(&str, UpAxis); 6] = [
 
 impl CheckpointArgs {
     /// The options that have an effect on checkpoints and packages alone, not on captures trained from pictures.
-    pub(crate) const OF_CHECKPOINTS: [&str; 8] = [
+    pub(crate) const OF_CHECKPOINTS: [&str; 11] = [
         "--rotation-convention",
         "--raster-fov",
         "--trained-cameras",
@@ -78,6 +88,9 @@ impl CheckpointArgs {
         "--prefilter-var",
         "--up",
         "--duration",
+        "--cutoff",
+        "--fps",
+        "--tolerance",
     ];
 
     /// Returns the settings of a capture that is trained from pictures.
@@ -119,6 +132,9 @@ impl CheckpointArgs {
             prefilter_var: self.prefilter_var,
             up: self.up,
             duration_seconds: self.duration,
+            marginal_cutoff: self.cutoff,
+            fps: self.fps,
+            tolerance: self.tolerance,
         }
     }
 }

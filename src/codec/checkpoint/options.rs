@@ -30,6 +30,7 @@ pub(super) fn trained_with(options: &ReadOptions, cfg_args: Option<&str>, file: 
         sh_direction: options.sh_direction.unwrap_or(default.sh_direction),
         force_sh_3d: options.force_sh_3d.unwrap_or(default.force_sh_3d),
         prefilter_var: options.prefilter_var.or(cfg.prefilter_var).unwrap_or(default.prefilter_var),
+        marginal_cutoff: options.marginal_cutoff.unwrap_or(default.marginal_cutoff),
         iteration: file.iteration,
         pixel: default.pixel,
         validation: default.validation,

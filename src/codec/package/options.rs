@@ -33,6 +33,7 @@ pub(super) fn apply(options: &ReadOptions, scene: &mut GaussianScene) -> Result<
     stored.background = options.background.unwrap_or(stored.background);
     stored.raster_fov = options.raster_fov.unwrap_or(stored.raster_fov);
     stored.cameras = options.cameras.unwrap_or(stored.cameras);
+    stored.marginal_cutoff = options.marginal_cutoff.unwrap_or(stored.marginal_cutoff);
     stored.sh_direction = options.sh_direction.unwrap_or(stored.sh_direction);
     scene.playback.up = options.up.unwrap_or(scene.playback.up);
     scene.playback.duration_seconds = options.duration_seconds.unwrap_or(scene.playback.duration_seconds);

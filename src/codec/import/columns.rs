@@ -1,0 +1,152 @@
+//! Gaussians in columns, as most formats of other makes have them.
+//!
+//! In: the values that a reader decodes. Out: [`Columns`], converted to a [`GaussianScene`]: at rest in the trained form, moving in the sliced form.
+
+use super::error::ImportError;
+use crate::codec::options::ReadOptions;
+use crate::gaussian::{Gaussian, Harmonics, InvalidGaussian, Parameters, SMALLEST_CUTOFF, SliceSettings};
+use crate::scene::{
+    Form, GaussianScene, PlaybackHints, SceneForm, Sliced, TemporalFilter, Trained, TrainedWith, UpAxis,
+};
+
+/// Gaussians in columns, one entry for each; capture space.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Columns {
+    /// Means, capture units; of moving Gaussians at the time `mean_t`.
+    pub mean: Vec<[f32; 3]>,
+    /// Logarithms of the scales, which are standard deviations, capture units.
+    pub log_scale: Vec<[f32; 3]>,
+    /// Rotations, quaternions w, x, y, z of any length but 0.
+    pub rotation: Vec<[f32; 4]>,
+    /// Logits of the opacities.
+    pub opacity_logit: Vec<f32>,
+    /// Colors, of time degree 0.
+    pub harmonics: Harmonics,
+    /// Motion and lifespans; empty if all are at rest and present at every time.
+    pub motion: Vec<Motion>,
+    /// Segments of time in which each Gaussian is active; all if `None`.
+    pub filter: Option<TemporalFilter>,
+}
+
+/// Motion and lifespan of a Gaussian.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Motion {
+    /// Velocity, capture units per timestamp unit.
+    pub velocity: [f32; 3],
+    /// Temporal mean, timestamp units.
+    pub mean_t: f32,
+    /// Temporal standard deviation, timestamp units; infinite if the Gaussian is present at every time.
+    pub sigma_t: f32,
+}
+
+/// What a format says, or means, about playing its files. [`ReadOptions`] replace each value.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Played {
+    /// The axis that points up.
+    pub up: UpAxis,
+    /// First and last timestamp.
+    pub time_interval: [f32; 2],
+    /// Seconds of one pass through the interval; 0 for a still.
+    pub duration_seconds: f32,
+    /// The marginal at and below which a Gaussian is not drawn; [`SMALLEST_CUTOFF`] if the format has none.
+    pub marginal_cutoff: f32,
+}
+
+impl Played {
+    /// Returns the values for Gaussians at rest.
+    pub(crate) fn still(up: UpAxis) -> Self {
+        Self { up, time_interval: [0.0, 1.0], duration_seconds: 0.0, marginal_cutoff: SMALLEST_CUTOFF }
+    }
+}
+
+impl Columns {
+    /// Returns empty columns with space for `count` Gaussians of this degree of color.
+    pub(crate) fn with_capacity(count: usize, degree: u32) -> Self {
+        let coefficients = (degree as usize + 1).pow(2);
+        Self {
+            mean: Vec::with_capacity(count),
+            log_scale: Vec::with_capacity(count),
+            rotation: Vec::with_capacity(count),
+            opacity_logit: Vec::with_capacity(count),
+            harmonics: Harmonics {
+                coefficients,
+                degree,
+                degree_t: 0,
+                values: Vec::with_capacity(count * coefficients * 3),
+            },
+            motion: Vec::new(),
+            filter: None,
+        }
+    }
+
+    /// Returns the number of Gaussians.
+    pub(crate) fn len(&self) -> usize {
+        self.mean.len()
+    }
+
+    /// Converts to a scene. Gaussians at rest without a filter get the trained form, others the sliced form.
+    ///
+    /// # Errors
+    /// Invalid options; a moving Gaussian that cannot be drawn; columns of different lengths.
+    pub(crate) fn into_scene(self, played: Played, options: &ReadOptions) -> Result<GaussianScene, ImportError> {
+        options.check()?;
+        let count = self.len();
+        let lengths = [self.log_scale.len(), self.rotation.len(), self.opacity_logit.len()];
+        let has_motion = !self.motion.is_empty();
+        if lengths.iter().any(|&length| length != count)
+            || (has_motion && self.motion.len() != count)
+            || !self.harmonics.is_consistent(count)
+        {
+            return Err(ImportError::damaged("its attributes have different numbers of Gaussians"));
+        }
+        let Self { mean, log_scale, rotation, opacity_logit, harmonics, motion, filter } = self;
+        let parameters =
+            Parameters { mean, log_scale, rotation_l: rotation, opacity_logit, ..Parameters::default() };
+        let form = if has_motion || filter.is_some() {
+            let mut gaussians = parameters.slice(&SliceSettings::default())?;
+            for (index, (gaussian, own)) in gaussians.iter_mut().zip(&motion).enumerate() {
+                let Motion { velocity, mean_t, sigma_t } = *own;
+                *gaussian = Gaussian { velocity, mean_t, sigma_t, ..*gaussian };
+                gaussian.check().map_err(|reason| InvalidGaussian { index, reason })?;
+            }
+            SceneForm::Ready(Form::Sliced(Sliced { gaussians, harmonics }))
+        } else {
+            SceneForm::Trained(Trained { parameters, harmonics })
+        };
+        let scene = GaussianScene {
+            form,
+            environment: None,
+            filter,
+            trained_with: TrainedWith {
+                time_interval: options.time_interval.unwrap_or(played.time_interval),
+                background: options.background.unwrap_or_default(),
+                marginal_cutoff: options.marginal_cutoff.unwrap_or(played.marginal_cutoff),
+                raster_fov: options.raster_fov.unwrap_or_default(),
+                cameras: options.cameras.unwrap_or_default(),
+                sh_direction: options.sh_direction.unwrap_or_default(),
+                ..TrainedWith::default()
+            },
+            playback: PlaybackHints {
+                up: options.up.unwrap_or(played.up),
+                duration_seconds: options.duration_seconds.unwrap_or(played.duration_seconds),
+            },
+            levels: Vec::new(),
+        };
+        scene.check().map_err(ImportError::damaged)?;
+        Ok(scene)
+    }
+}
+
+/// Returns the logit of an opacity. 0 and 1 become the nearest values with a finite logit, which are drawn alike.
+pub(crate) fn logit(opacity: f32) -> f32 {
+    let opacity = f64::from(opacity).clamp(1e-7, 1.0 - 1e-7);
+    (opacity / (1.0 - opacity)).ln() as f32
+}
+
+/// The factor of the coefficient of degree 0: 1 / (2 √π).
+pub(crate) const SH_C0: f32 = 0.282_094_8;
+
+/// Returns the coefficient of degree 0 of a color channel from 0 to 1.
+pub(crate) fn coefficient(channel: f32) -> f32 {
+    (channel - 0.5) / SH_C0
+}

@@ -1,0 +1,81 @@
+//! A file to read, and the other files of its folder.
+//!
+//! In: bytes in memory, a name, the files beside it. Out: [`Source`], from which each format of `import` reads.
+
+use std::collections::BTreeMap;
+use std::io;
+use std::path::Path;
+
+/// A file to read.
+#[derive(Clone, Copy)]
+pub(crate) struct Source<'a> {
+    /// Its path, for its extension and for messages.
+    pub path: &'a Path,
+    /// Its bytes.
+    pub bytes: &'a [u8],
+    /// The other files.
+    pub beside: &'a dyn Beside,
+}
+
+/// Files beside a file, by their paths relative to its folder.
+pub(crate) trait Beside {
+    /// Returns the bytes of a file.
+    ///
+    /// # Errors
+    /// A file that is not there or cannot be read; a path that leaves the folder.
+    fn read(&self, name: &str) -> io::Result<Vec<u8>>;
+}
+
+/// Files in a folder on disk.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct InFolder<'a>(pub &'a Path);
+
+impl Beside for InFolder<'_> {
+    fn read(&self, name: &str) -> io::Result<Vec<u8>> {
+        std::fs::read(self.0.join(checked(name)?)).map_err(|error| named(name, error))
+    }
+}
+
+/// Files in memory.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct InMemory(pub BTreeMap<String, Vec<u8>>);
+
+impl Beside for InMemory {
+    fn read(&self, name: &str) -> io::Result<Vec<u8>> {
+        let found = self.0.get(checked(name)?).cloned();
+        found.ok_or_else(|| named(name, io::Error::new(io::ErrorKind::NotFound, "there is no such file")))
+    }
+}
+
+/// Returns the name, unless it leads out of the folder.
+fn checked(name: &str) -> io::Result<&str> {
+    let is_inside = !name.is_empty()
+        && !name.contains(['\\', ':', '\0'])
+        && name.split('/').all(|part| !part.is_empty() && part != "..");
+    if is_inside {
+        Ok(name)
+    } else {
+        let name = name.escape_debug();
+        Err(io::Error::new(io::ErrorKind::InvalidInput, format!("\"{name}\" is no file in the folder of the file that names it")))
+    }
+}
+
+fn named(name: &str, error: io::Error) -> io::Error {
+    io::Error::new(error.kind(), format!("{}, which the file names: {error}", name.escape_debug()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_that_leave_the_folder_are_refused() {
+        let files = InMemory(BTreeMap::from([("a/b.webp".to_owned(), vec![1])]));
+        assert_eq!(files.read("a/b.webp").expect("a file of a folder inside"), [1], "files of folders inside are read");
+        for name in ["../b", "a/../../b", "/etc/passwd", "", "a//b", "c:b", "a\\b"] {
+            let found = files.read(name).expect_err("outside");
+            assert_eq!(found.kind(), io::ErrorKind::InvalidInput, "{name} leaves the folder: {found}");
+        }
+        assert_eq!(files.read("c").expect_err("absent").kind(), io::ErrorKind::NotFound, "a file that is not there");
+    }
+}

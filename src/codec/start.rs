@@ -1,0 +1,51 @@
+//! The start of a file, by which its format is recognized.
+//!
+//! In: a seekable reader and the name of the file. Out: [`Start`]: its first bytes, its extension, and the names of the entries if it is a zip
+//! archive.
+
+use std::borrow::Cow;
+use std::io::{self, Read, Seek};
+use std::path::Path;
+
+/// Number of first bytes.
+const LENGTH: u64 = 4096;
+/// The first bytes of a zip archive with an entry.
+pub(crate) const ZIP: &[u8] = b"PK\x03\x04";
+
+/// The start of a file.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(crate) struct Start {
+    /// Its first 4096 bytes, or all if there are fewer.
+    pub bytes: Vec<u8>,
+    /// Its extension in lower case, without the dot.
+    pub extension: String,
+    /// The names of the entries of a zip archive; none of other files, and of archives that are damaged.
+    pub entries: Vec<String>,
+}
+
+impl Start {
+    /// Reads the start of a file and returns to its first byte.
+    ///
+    /// # Errors
+    /// Errors of the reader.
+    pub(crate) fn of<R: Read + Seek>(reader: &mut R, path: &Path) -> io::Result<Self> {
+        let mut bytes = Vec::new();
+        reader.rewind()?;
+        reader.by_ref().take(LENGTH).read_to_end(&mut bytes)?;
+        let mut entries = Vec::new();
+        if bytes.starts_with(ZIP) {
+            reader.rewind()?;
+            if let Ok(archive) = zip::ZipArchive::new(&mut *reader) {
+                entries = archive.file_names().filter_map(Result::ok).map(Cow::into_owned).collect();
+            }
+        }
+        reader.rewind()?;
+        let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
+        Ok(Self { bytes, extension: extension.unwrap_or_default(), entries })
+    }
+
+    /// Returns whether the archive has an entry of this name in its root.
+    pub(crate) fn has_entry(&self, name: &str) -> bool {
+        self.entries.iter().any(|entry| entry == name)
+    }
+}
