@@ -156,6 +156,7 @@ pub mod offline {
     pub mod fine_tune {
         pub use crate::offline::fine_tune::adam::*;
         pub use crate::offline::fine_tune::dropout::*;
+        pub use crate::offline::fine_tune::environment_backward::*;
         pub use crate::offline::fine_tune::loss::*;
         pub use crate::offline::fine_tune::neighbors::*;
         pub use crate::offline::fine_tune::noise::*;

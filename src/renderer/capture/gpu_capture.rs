@@ -249,6 +249,12 @@ impl GpuCapture {
         }
     }
 
+    /// Returns the buffer of the texels of the environment map, planar, for passes of clients that write them. Returns `None` if the capture
+    /// has no map.
+    pub fn environment(&self) -> Option<&wgpu::Buffer> {
+        self.environment.as_ref().map(|map| &map.buffer)
+    }
+
     /// Returns the bind group of the geometry, for passes of clients. Returns `None` if the capture has several parts.
     pub fn geometry(&self) -> Option<&wgpu::BindGroup> {
         if let [part] = &self.parts[..] { Some(&part.geometry) } else { None }
