@@ -64,6 +64,12 @@ impl Mask {
         self.check_options()?;
         let out = self.package.checked_out(self.data.add_to(Files::default().reads_scene(&self.input)))?;
         let mut scene = self.checkpoint.load_to_change(&self.input)?;
+        if scene.filter.as_ref().is_some_and(|filter| filter.kind == FilterKind::Window) {
+            return Err(Failure::about(
+                &self.input,
+                "has Gaussians that exist in stretches of time, which no other filter may replace",
+            ));
+        }
         scene.filter = None;
         let by_views = needs_views(self.filter);
         let views = if by_views || self.every.is_some() {

@@ -112,6 +112,7 @@ fn mirrors() -> [Mirror; 20] {
             per_thread,
             binning,
             trained_variance,
+            marginal_cutoff,
             padding,
             crop_x,
             crop_y,

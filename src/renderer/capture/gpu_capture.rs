@@ -160,6 +160,7 @@ impl GpuCapture {
             first_entries: form.coded_colors().map(first_entries).unwrap_or_default(),
             displaced: u32::from(scene.trained_with.sh_direction == ShDirection::Displaced),
             time_span: scene.trained_with.time_span(),
+            marginal_cutoff: scene.trained_with.marginal_cutoff,
             ..bytemuck::Zeroable::zeroed()
         };
         let id = NEXT_ID.fetch_add(1, Ordering::Relaxed);
@@ -270,6 +271,7 @@ impl GpuCapture {
             stages: self.settings.stages,
             first_entries: self.settings.first_entries,
             time_span: self.settings.time_span,
+            marginal_cutoff: self.settings.marginal_cutoff,
             ..*view
         }
     }
