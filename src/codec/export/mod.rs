@@ -2,15 +2,15 @@
 //!
 //! In: a [`GaussianScene`](crate::scene::GaussianScene), and for formats without motion a time. Out: the file, and what of the scene it does not
 //! show. `instant` and `moving` turn a scene into [`Columns`](super::import::columns::Columns), each format is one file that writes these,
-//! `table` lists the formats.
+//! `table` lists the formats,
+//! and `exporter` calls all of these.
 
-mod error;
-pub(crate) mod instant;
-pub(crate) mod lost;
-pub(crate) mod moving;
+pub(crate) mod error;
+pub(crate) mod exporter;
+mod instant;
+mod lost;
+mod moving;
 mod ply;
 mod splat;
 mod still;
 pub(crate) mod table;
-
-pub(crate) use error::ExportError;
