@@ -9,7 +9,7 @@ mod error;
 pub(crate) mod export;
 pub(crate) mod format;
 pub(crate) mod import;
-mod options;
+pub(crate) mod options;
 pub mod package;
 mod start;
 pub(crate) mod text;
