@@ -4,9 +4,13 @@
 //! not show. Each format is one file here, which fills [`Columns`] and calls [`Columns::into_scene`]; `super::format` has the table of formats.
 
 pub(crate) mod columns;
+pub(crate) mod drawable;
 mod error;
 mod imported;
+pub(crate) mod ply;
+pub(crate) mod sequence;
 pub(crate) mod source;
+pub(crate) mod splat;
 
 pub use error::ImportError;
 pub(crate) use imported::Imported;
