@@ -23,6 +23,7 @@ use format::FORMATS;
 pub use format::Format;
 use format::Read;
 use import::Imported;
+use import::sequence;
 use import::source::{Beside, InFolder, Source};
 use package::{PackageInfo, WriteSettings};
 use start::Start;
@@ -77,6 +78,29 @@ pub(crate) fn read_bytes(
         Some(Read::Bytes(read)) => Ok(read(&Source { path, bytes, beside }, options)?),
         Some(Read::File(_) | Read::Folder(_)) | None => Err(CodecErrorKind::UnknownFormat(format::unknown())),
     }
+}
+
+/// Reads the frames of a sequence, each the name and the bytes of a file, in order.
+///
+/// # Errors
+/// As [`read_bytes`], with the name of the frame.
+pub(crate) fn read_frames(frames: Vec<(String, Vec<u8>)>, options: &ReadOptions) -> Result<Imported, CodecErrorKind> {
+    let frames = frames.into_iter().map(|(name, bytes)| sequence::Frame { name, bytes: Box::new(move || Ok(bytes)) });
+    Ok(sequence::read(frames, options)?)
+}
+
+/// Returns the name of the file of a sequence that follows one of this name; `None` for a name without a number.
+pub(crate) fn next_frame(name: &str) -> Option<String> {
+    sequence::next(name)
+}
+
+/// Returns the extensions of files of other makes, without the dot.
+pub(crate) fn imported_extensions() -> Vec<&'static str> {
+    let imported = FORMATS.iter().filter(|format| matches!(format.read, Read::Bytes(_)));
+    let mut extensions: Vec<&str> = imported.flat_map(|format| format.extensions).copied().collect();
+    extensions.sort_unstable();
+    extensions.dedup();
+    extensions
 }
 
 /// Returns the format of a file. If the files of that format have sections, all checksums are verified, and the header
