@@ -6,6 +6,7 @@
 pub(crate) mod columns;
 pub(crate) mod drawable;
 mod error;
+pub(crate) mod gltf;
 mod imported;
 pub(crate) mod placed;
 pub(crate) mod ply;
