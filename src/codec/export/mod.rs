@@ -8,10 +8,16 @@
 mod clip;
 pub(crate) mod error;
 pub(crate) mod exporter;
+mod gltf;
 mod instant;
 mod lost;
 mod moving;
 mod ply;
+#[cfg(test)]
+mod samples;
 mod splat;
+mod spz;
 mod still;
 pub(crate) mod table;
+mod usd;
+mod y_up;

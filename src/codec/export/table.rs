@@ -4,7 +4,7 @@
 //! one row of [`EXPORTS`]; the function gets [`Columns`], so that it knows neither packed records nor harmonics in time.
 
 pub(crate) use super::clip::Clip;
-use super::{ply, splat};
+use super::{gltf, ply, splat, spz, usd};
 use crate::codec::import::columns::Columns;
 use std::io::{self, Write};
 
@@ -32,7 +32,6 @@ pub(crate) enum What {
     /// Gaussians only a filter switches on and off are refused before.
     Moving(Writer),
     /// As `Moving`, with the temporal filter of the capture if it has one: its intervals must be written too.
-    #[expect(dead_code, reason = "for formats with windows of time, of which there is no row yet")]
     Windowed(Writer),
 }
 
@@ -64,6 +63,30 @@ pub const EXPORTS: &[Export] = &[
             "A .splat file has no view-dependent color: the coefficients above degree 0 are left out.",
             "A .splat file has 256 values for each color channel, the opacity and each component of a rotation.",
         ],
+    },
+    Export {
+        id: "spz",
+        name: "an SPZ file, version 3 (.spz)",
+        extension: "spz",
+        what: What::Instant(spz::write),
+        lost: &[
+            "An SPZ file has 256 values for each color channel, the opacity and each scale, which is from e^-10 to e^5.94.",
+            "An SPZ file has 32 values for each coefficient of degree 1 and 16 for each above, from -1 to 1.",
+        ],
+    },
+    Export {
+        id: "gltf",
+        name: "a binary glTF file (.glb)",
+        extension: "glb",
+        what: What::Instant(gltf::write),
+        lost: &[],
+    },
+    Export {
+        id: "usd",
+        name: "an OpenUSD text file (.usda)",
+        extension: "usda",
+        what: What::Windowed(usd::write),
+        lost: &[],
     },
 ];
 

@@ -8,9 +8,6 @@ use crate::codec::import::columns::{Columns, coefficient, logit};
 use crate::codec::import::error::ImportError;
 use crate::codec::import::spz;
 
-/// The logarithm of a scale of 0.
-const FLAT: f32 = -20.0;
-
 /// The prefix of the attributes of the extension.
 const PREFIX: &str = "KHR_gaussian_splatting:";
 
@@ -112,8 +109,10 @@ pub(super) fn columns(
     rotation.read(|_, [x, y, z, w]| columns.rotation.push([w, x, y, z]))?;
     let scale = needed("SCALE", name("SCALE"))?;
     fits(&scale)?;
-    let log = |scale: f32| if scale > 0.0 { scale.ln().max(FLAT) } else { FLAT };
-    scale.read(|_, scale: [f32; 3]| columns.log_scale.push(if has_log_scales { scale } else { scale.map(log) }))?;
+    // The logarithm of 0 is replaced later, as in files of other formats.
+    scale.read(|_, scale: [f32; 3]| {
+        columns.log_scale.push(if has_log_scales { scale } else { scale.map(f32::ln) });
+    })?;
 
     let fallback = rows("COLOR_0", "COLOR_0".to_owned())?;
     let mut opacities = Vec::with_capacity(count);

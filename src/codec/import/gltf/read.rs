@@ -11,6 +11,7 @@ use super::nodes::placed;
 use super::primitive::{ColorSpace, checked, columns, has_log_scales, splats};
 use crate::codec::import::Imported;
 use crate::codec::import::columns::{Columns, Played};
+use crate::codec::import::drawable::keep_drawable;
 use crate::codec::import::error::ImportError;
 use crate::codec::import::placed::place;
 use crate::codec::import::source::Source;
@@ -55,7 +56,8 @@ pub(crate) fn read(source: &Source<'_>, options: &ReadOptions) -> Result<Importe
     let accessors = Accessors { document: &document, buffers };
     let mut lost = Vec::new();
     let parts = parts(&accessors, &mut lost)?;
-    let columns = joined(parts);
+    let mut columns = joined(parts);
+    lost.extend(keep_drawable(&mut columns));
     Ok(Imported { scene: columns.into_scene(Played::still(UpAxis::PosY), options)?, lost })
 }
 
@@ -252,7 +254,7 @@ mod tests {
         assert_eq!(parameters.mean[1], [-1.0, 0.5, 0.0], "means");
         assert_eq!(parameters.rotation_l[0], [0.8, 0.0, 0.6, 0.0], "rotations w, x, y, z");
         assert_eq!(parameters.log_scale[1], [0.5_f32.ln(), 0.25_f32.ln(), 2.0_f32.ln()], "logarithms of scales");
-        assert_eq!(parameters.log_scale[0][2], -20.0, "a scale of 0 is tiny");
+        assert_eq!(parameters.log_scale[0][2], -30.0, "a scale of 0 is tiny");
         assert_eq!(parameters.opacity_logit, [logit(0.25), logit(1.0)], "logits of opacities");
         assert_eq!(harmonics.of(0)[3..6], [0.01, 0.02, 0.03], "the first coefficient of degree 1");
     }
