@@ -7,7 +7,7 @@ use super::checkpoint;
 use super::error::CodecErrorKind;
 use super::import::source::Source;
 use super::import::{ImportError, Imported};
-use super::import::{ply, sequence, splat};
+use super::import::{gltf, ply, sequence, splat, spz};
 use super::options::ReadOptions;
 use super::package::{self, PackageInfo, WriteSettings};
 use super::start::{Start, ZIP};
@@ -82,6 +82,24 @@ pub const FORMATS: &[Format] = &[
         extensions: &[],
         is_of: |start| sequence::is_sequence(&start.entries),
         read: Read::Folder(sequence::read_folder),
+        write: None,
+        inspect: None,
+    },
+    Format {
+        id: "spz",
+        name: "an SPZ file (.spz)",
+        extensions: &["spz"],
+        is_of: spz::is_of,
+        read: Read::Bytes(spz::read),
+        write: None,
+        inspect: None,
+    },
+    Format {
+        id: "gltf",
+        name: "a glTF file with Gaussians (.glb or .gltf)",
+        extensions: &["glb", "gltf"],
+        is_of: gltf::is_of,
+        read: Read::Bytes(gltf::read),
         write: None,
         inspect: None,
     },
@@ -162,7 +180,7 @@ mod tests {
 
     #[test]
     fn the_message_about_an_unknown_format_names_every_format() {
-        let expected = "neither a checkpoint of the 4DGS trainer (.pth, a zip archive), a package (.gs4d), a PLY of Gaussians (.ply), a folder of numbered PLY files nor a .splat file (.splat)";
+        let expected = "neither a checkpoint of the 4DGS trainer (.pth, a zip archive), a package (.gs4d), a PLY of Gaussians (.ply), a folder of numbered PLY files, an SPZ file (.spz), a glTF file with Gaussians (.glb or .gltf) nor a .splat file (.splat)";
         assert_eq!(unknown(), expected, "every format by name and extension");
     }
 

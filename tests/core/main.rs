@@ -30,6 +30,7 @@ mod scene_parts;
 mod score;
 #[cfg(feature = "offline")]
 mod score_formula;
+mod spz_and_gltf;
 mod thin;
 
 #[path = "../support"]

@@ -5,12 +5,19 @@
 //! `table` lists the formats,
 //! and `exporter` calls all of these.
 
+mod clip;
 pub(crate) mod error;
 pub(crate) mod exporter;
+mod gltf;
 mod instant;
 mod lost;
 mod moving;
 mod ply;
+#[cfg(test)]
+mod samples;
 mod splat;
+mod spz;
 mod still;
 pub(crate) mod table;
+mod usd;
+mod y_up;

@@ -3,9 +3,9 @@
 //! In: an id or an extension. Out: an [`Export`], with the function that writes its files. A further format is one new file in this folder and
 //! one row of [`EXPORTS`]; the function gets [`Columns`], so that it knows neither packed records nor harmonics in time.
 
-use super::{ply, splat};
+pub(crate) use super::clip::Clip;
+use super::{gltf, ply, splat, spz, usd};
 use crate::codec::import::columns::Columns;
-use crate::scene::UpAxis;
 use std::io::{self, Write};
 
 /// A format to export to: a row of the table.
@@ -32,27 +32,11 @@ pub(crate) enum What {
     /// Gaussians only a filter switches on and off are refused before.
     Moving(Writer),
     /// As `Moving`, with the temporal filter of the capture if it has one: its intervals must be written too.
-    #[expect(dead_code, reason = "for formats with windows of time, of which there is no row yet")]
     Windowed(Writer),
 }
 
 /// Writes the file of a format. Colors have time degree 0, opacities are finite logits, quaternions have any length but 0.
 pub(crate) type Writer = fn(&Columns, &Clip, &mut dyn Write) -> io::Result<()>;
-
-/// How the Gaussians of an export are played.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Clip {
-    /// First and last timestamp; those of the capture also in the file of one instant.
-    pub time_interval: [f32; 2],
-    /// Seconds of one pass through the interval; 0 for a still.
-    pub duration_seconds: f32,
-    /// Frames a second, for formats that count in frames.
-    pub fps: f32,
-    /// The axis of the capture that points up. Writers of formats with an axis of their own rotate the Gaussians, with their colors.
-    pub up: UpAxis,
-    /// The marginal at and below which a Gaussian is not drawn.
-    pub marginal_cutoff: f32,
-}
 
 /// All formats.
 pub const EXPORTS: &[Export] = &[
@@ -79,6 +63,30 @@ pub const EXPORTS: &[Export] = &[
             "A .splat file has no view-dependent color: the coefficients above degree 0 are left out.",
             "A .splat file has 256 values for each color channel, the opacity and each component of a rotation.",
         ],
+    },
+    Export {
+        id: "spz",
+        name: "an SPZ file, version 3 (.spz)",
+        extension: "spz",
+        what: What::Instant(spz::write),
+        lost: &[
+            "An SPZ file has 256 values for each color channel, the opacity and each scale, which is from e^-10 to e^5.94.",
+            "An SPZ file has 32 values for each coefficient of degree 1 and 16 for each above, from -1 to 1.",
+        ],
+    },
+    Export {
+        id: "gltf",
+        name: "a binary glTF file (.glb)",
+        extension: "glb",
+        what: What::Instant(gltf::write),
+        lost: &[],
+    },
+    Export {
+        id: "usd",
+        name: "an OpenUSD text file (.usda)",
+        extension: "usda",
+        what: What::Windowed(usd::write),
+        lost: &[],
     },
 ];
 

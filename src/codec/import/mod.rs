@@ -6,11 +6,14 @@
 pub(crate) mod columns;
 pub(crate) mod drawable;
 mod error;
+pub(crate) mod gltf;
 mod imported;
+pub(crate) mod placed;
 pub(crate) mod ply;
 pub(crate) mod sequence;
 pub(crate) mod source;
 pub(crate) mod splat;
+pub(crate) mod spz;
 
 pub use error::ImportError;
 pub(crate) use imported::Imported;
