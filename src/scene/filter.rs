@@ -20,6 +20,9 @@ pub enum FilterKind {
     /// views.
     #[default]
     Support,
+    /// The windows of time in which the capture itself has each Gaussian: frames of a sequence, pieces of a path. Without this filter, or with
+    /// another one, the capture is a different one.
+    Window,
 }
 
 /// Sets of active Gaussians, one for each segment of time.

@@ -13,6 +13,7 @@ mod gaussian_scene;
 pub mod grow;
 pub(crate) mod packed;
 mod pick;
+pub(crate) mod pieces;
 mod provenance;
 pub(crate) mod random;
 mod runtime_scene;

@@ -208,7 +208,7 @@ fn compress_by(
             let gaussians = (0..packed.len()).map(|index| packed.gaussian(index));
             TemporalFilter::support(gaussians, scene.trained_with.time_interval, filter.segments)
         }
-        FilterKind::KeyFrame | FilterKind::Interval => filter.select(&order),
+        FilterKind::KeyFrame | FilterKind::Interval | FilterKind::Window => filter.select(&order),
     });
     report.memory_after = packed.size();
     let scene = GaussianScene {
