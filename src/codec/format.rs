@@ -5,8 +5,9 @@
 
 use super::checkpoint;
 use super::error::CodecErrorKind;
+use super::fourdgs;
 use super::import::source::Source;
-use super::import::{ImportError, Imported, splatv};
+use super::import::{ImportError, Imported, npz, splatv};
 use super::options::ReadOptions;
 use super::package::{self, PackageInfo, WriteSettings};
 use super::start::{Start, ZIP};
@@ -73,6 +74,24 @@ pub const FORMATS: &[Format] = &[
         write: None,
         inspect: None,
     },
+    Format {
+        id: "4dgs",
+        name: "a capture of the 4dgs format (.4dgs)",
+        extensions: fourdgs::EXTENSIONS,
+        is_of: fourdgs::is_of,
+        read: Read::Bytes(fourdgs::read),
+        write: None,
+        inspect: None,
+    },
+    Format {
+        id: "dynamic-3dgs",
+        name: "parameters of Dynamic 3D Gaussians (.npz)",
+        extensions: npz::EXTENSIONS,
+        is_of: npz::is_of,
+        read: Read::Bytes(npz::read),
+        write: None,
+        inspect: None,
+    },
 ];
 
 impl Format {
@@ -134,8 +153,9 @@ mod tests {
 
     #[test]
     fn the_message_about_an_unknown_format_names_every_format() {
-        let expected = "neither a checkpoint of the 4DGS trainer (.pth, a zip archive), a package (.gs4d) nor a capture of the player splaTV \
-                        (.splatv)";
+        let expected = "neither a checkpoint of the 4DGS trainer (.pth, a zip archive), a package (.gs4d), \
+                        a capture of the player splaTV (.splatv), a capture of the 4dgs format (.4dgs) nor parameters of \
+                        Dynamic 3D Gaussians (.npz)";
         assert_eq!(unknown(), expected, "every format by name and extension");
     }
 

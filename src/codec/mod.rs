@@ -7,7 +7,9 @@
 pub mod checkpoint;
 mod error;
 pub(crate) mod format;
+mod fourdgs;
 pub(crate) mod import;
+pub(crate) mod npy;
 mod options;
 pub mod package;
 mod start;

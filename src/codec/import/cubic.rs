@@ -9,7 +9,7 @@ use super::imported::Imported;
 use super::in_pieces::{in_pieces, middle_scale, splitting, statements};
 use crate::codec::options::ReadOptions;
 use crate::gaussian::SMALLEST_CUTOFF;
-use crate::scene::pieces::{Bends, Curve, Piece};
+use crate::scene::pieces::{ALWAYS, Bends, Curve, Piece};
 use crate::scene::{MAX_SEGMENTS, UpAxis};
 use glam::{DQuat, DVec3, DVec4};
 
@@ -105,6 +105,7 @@ pub(crate) fn imported(mut gaussians: Vec<Cubic>, options: &ReadOptions) -> Resu
             position: |time| gaussian.position(time),
             mean_t: gaussian.mean_t,
             sigma_t: gaussian.sigma_t(),
+            window: ALWAYS,
             scale: middle_scale(whole.log_scale[index]),
         }
     });

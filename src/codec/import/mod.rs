@@ -7,7 +7,8 @@ pub(crate) mod columns;
 mod cubic;
 mod error;
 mod imported;
-mod in_pieces;
+pub(crate) mod in_pieces;
+pub(crate) mod npz;
 pub(crate) mod source;
 pub(crate) mod splatv;
 
