@@ -5,11 +5,15 @@
 
 pub(crate) mod columns;
 mod cubic;
+pub(crate) mod drawable;
 mod error;
 mod imported;
 pub(crate) mod in_pieces;
 pub(crate) mod npz;
+pub(crate) mod ply;
+pub(crate) mod sequence;
 pub(crate) mod source;
+pub(crate) mod splat;
 pub(crate) mod splatv;
 
 pub use error::ImportError;

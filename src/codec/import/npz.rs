@@ -8,7 +8,7 @@ use super::imported::Imported;
 use super::in_pieces::{in_pieces, middle_scale, splitting, statements};
 use super::source::Source;
 use crate::codec::npy::Array;
-use crate::codec::options::ReadOptions;
+use crate::codec::options::{FPS, ReadOptions};
 use crate::codec::start::Start;
 use crate::gaussian::SMALLEST_CUTOFF;
 use crate::scene::pieces::{ALWAYS, Bends, Curve, Piece};
@@ -21,8 +21,6 @@ use zip::ZipArchive;
 pub(crate) const EXTENSIONS: &[&str] = &["npz"];
 /// The array of the means, by which the format is recognized.
 const MEANS: &str = "means3D";
-/// Frames a second, unless an option says another number.
-const FPS: f32 = 30.0;
 /// Largest number of values that a byte of a compressed entry may stand for.
 const DEFLATED: u64 = 1040;
 
