@@ -94,6 +94,11 @@ impl TemporalFilter {
         filter
     }
 
+    /// Returns whether it is part of the capture, which no other filter, and no absence of one, may replace.
+    pub(crate) fn is_of_capture(&self) -> bool {
+        self.kind == FilterKind::Window
+    }
+
     /// Checks that it is a filter of `count` Gaussians, and that intervals end within its segments.
     ///
     /// # Errors

@@ -72,7 +72,7 @@ pub(crate) fn read<'a>(
         append(&mut all, columns);
     }
     let sets = ActiveSets::Intervals(intervals);
-    all.filter = Some(TemporalFilter { kind: FilterKind::Interval, segments: count, count: all.len(), sets });
+    all.filter = Some(TemporalFilter { kind: FilterKind::Window, segments: count, count: all.len(), sets });
     let time_interval = [0.0, duration_seconds];
     let played = Played { up: UpAxis::NegY, time_interval, duration_seconds, marginal_cutoff: SMALLEST_CUTOFF };
     Ok(Imported { scene: all.into_scene(played, options)?, lost: losses.sentences() })
