@@ -11,7 +11,7 @@ pub(crate) mod format;
 mod fourdgs;
 pub(crate) mod import;
 pub(crate) mod npy;
-mod options;
+pub(crate) mod options;
 pub mod package;
 mod start;
 pub(crate) mod text;

@@ -9,6 +9,8 @@ mod checkpoint;
 mod checkpoint_poison;
 #[cfg(feature = "offline")]
 mod dataset;
+mod exports;
+mod formats_ply;
 mod golden;
 mod gradients;
 mod grow;

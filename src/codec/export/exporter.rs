@@ -3,8 +3,9 @@
 //! In: a scene and a format. Out: [`Exporter`], which writes a file for each time, or one with all motion; and what of the scene its files do
 //! not show.
 
+use super::clip::Clip;
 use super::error::ExportError;
-use super::table::{Clip, Export, What};
+use super::table::{Export, What};
 use super::{instant, lost, moving};
 use crate::codec::import::columns::Columns;
 use crate::scene::GaussianScene;

@@ -5,6 +5,7 @@
 //! `table` lists the formats,
 //! and `exporter` calls all of these.
 
+mod clip;
 pub(crate) mod error;
 pub(crate) mod exporter;
 mod instant;

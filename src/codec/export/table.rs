@@ -3,9 +3,9 @@
 //! In: an id or an extension. Out: an [`Export`], with the function that writes its files. A further format is one new file in this folder and
 //! one row of [`EXPORTS`]; the function gets [`Columns`], so that it knows neither packed records nor harmonics in time.
 
+pub(crate) use super::clip::Clip;
 use super::{ply, splat};
 use crate::codec::import::columns::Columns;
-use crate::scene::UpAxis;
 use std::io::{self, Write};
 
 /// A format to export to: a row of the table.
@@ -38,21 +38,6 @@ pub(crate) enum What {
 
 /// Writes the file of a format. Colors have time degree 0, opacities are finite logits, quaternions have any length but 0.
 pub(crate) type Writer = fn(&Columns, &Clip, &mut dyn Write) -> io::Result<()>;
-
-/// How the Gaussians of an export are played.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Clip {
-    /// First and last timestamp; those of the capture also in the file of one instant.
-    pub time_interval: [f32; 2],
-    /// Seconds of one pass through the interval; 0 for a still.
-    pub duration_seconds: f32,
-    /// Frames a second, for formats that count in frames.
-    pub fps: f32,
-    /// The axis of the capture that points up. Writers of formats with an axis of their own rotate the Gaussians, with their colors.
-    pub up: UpAxis,
-    /// The marginal at and below which a Gaussian is not drawn.
-    pub marginal_cutoff: f32,
-}
 
 /// All formats.
 pub const EXPORTS: &[Export] = &[

@@ -175,3 +175,89 @@ impl Losses {
         self.sentences.iter().map(|sentence| format!("{}{others}: {sentence}", self.name)).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::ply::fixture::File;
+    use super::*;
+    use crate::scene::{Form, SceneForm};
+
+    fn frames(files: &[(&str, Vec<u8>)]) -> Vec<Frame<'static>> {
+        let frame = |(name, bytes): &(&str, Vec<u8>)| {
+            let (name, bytes) = ((*name).to_owned(), bytes.clone());
+            Frame { name, bytes: Box::new(move || Ok(bytes)) }
+        };
+        files.iter().map(frame).collect()
+    }
+
+    fn refusal(files: &[(&str, Vec<u8>)]) -> String {
+        read(frames(files).into_iter(), &ReadOptions::default()).expect_err("the sequence is refused").to_string()
+    }
+
+    #[test]
+    fn each_frame_is_active_in_its_own_segment() {
+        let files = [3, 0, 2].map(|count| ("", File::splats(count, if count == 2 { 9 } else { 0 }).little()));
+        let options = ReadOptions { fps: Some(2.0), ..ReadOptions::default() };
+        let scene = read(frames(&files).into_iter(), &options).expect("three frames").scene;
+        assert_eq!(scene.trained_with.time_interval, [0.0, 1.5], "three frames at two a second");
+        assert_eq!(scene.playback.duration_seconds, 1.5, "in seconds");
+        let filter = scene.filter.as_ref().expect("a filter");
+        assert_eq!(filter.active_counts(0..5), [3, 0, 2], "each frame has its own Gaussians");
+        assert_eq!([0.1, 0.6, 1.5].map(|time| filter.segment_of(time, [0.0, 1.5])), [0, 1, 2], "frames in order");
+        let SceneForm::Ready(Form::Sliced(sliced)) = &scene.form else { panic!("the sliced form") };
+        let always =
+            sliced.gaussians.iter().all(|gaussian| gaussian.sigma_t.is_infinite() && gaussian.velocity == [0.0; 3]);
+        assert!(always, "Gaussians neither move nor fade");
+        let (first, last) = (File::splats(3, 0), File::splats(2, 9));
+        assert_eq!(sliced.harmonics.degree, 1, "the highest degree of color");
+        assert_eq!(
+            sliced.harmonics.of(2)[..3],
+            ["f_dc_0", "f_dc_1", "f_dc_2"].map(|name| first.value(name, 2)),
+            "colors"
+        );
+        assert_eq!(sliced.harmonics.of(2)[3..], [0.0; 9], "new coefficients are 0");
+        assert_eq!(sliced.harmonics.of(4)[3], last.value("f_rest_0", 1), "coefficients of the last frame");
+        assert_eq!(
+            sliced.gaussians[4].mean,
+            ["x", "y", "z"].map(|name| last.value(name, 1)),
+            "means of the last frame"
+        );
+    }
+
+    #[test]
+    fn a_frame_that_cannot_be_read_is_named() {
+        let good = File::splats(1, 0).little();
+        let message = refusal(&[("frame_1.ply", good.clone()), ("frame_2.ply", good[..90].to_owned())]);
+        assert!(message.contains("frame_2.ply") && message.contains("cut"), "the frame and the fault: {message}");
+        let moving = File::splats(1, 0).with("time", |_| 0.0).with("log_duration", |_| 0.0).little();
+        let message = refusal(&[("frame_1.ply", moving)]);
+        assert!(message.contains("frame_1.ply") && message.contains("moving"), "a frame with motion: {message}");
+        assert!(refusal(&[]).contains("0 frames"), "no frames");
+        let fails = || Frame { name: "gone.ply".to_owned(), bytes: Box::new(|| Err(io::Error::other("it is gone"))) };
+        let message = read([fails()].into_iter(), &ReadOptions::default()).expect_err("it is gone").to_string();
+        assert!(message.contains("gone.ply: it is gone"), "a file that cannot be opened: {message}");
+        let lossy = File { comments: vec!["antialiased 1".to_owned()], ..File::splats(1, 0) }.little();
+        let three = ["a1.ply", "a2.ply", "a3.ply"].map(|name| (name, lossy.clone()));
+        let lost = read(frames(&three).into_iter(), &ReadOptions::default()).expect("three frames").lost;
+        assert_eq!(lost.len(), 1, "one sentence for all frames: {lost:?}");
+        assert!(lost[0].starts_with("a1.ply and 2 other frames: "), "that says how many: {lost:?}");
+    }
+
+    #[test]
+    fn frames_are_ordered_by_their_numbers() {
+        let names = |names: &[&str]| ordered(names.iter().map(|&name| name.to_owned()).collect());
+        let found = names(&["f10.ply", "f9.compressed.ply", "notes.txt", "f007.ply", "model.ply"]);
+        assert_eq!(found.expect("a sequence"), ["f007.ply", "f9.compressed.ply", "f10.ply"], "by number, not by name");
+        for (files, reason) in [
+            (&["f1.ply"][..], "without a sequence"),
+            (&["a.ply", "b.ply"], "without a sequence"),
+            (&["f1.ply", "g2.ply"], "two sequences"),
+            (&["f1.ply", "f01.ply", "f2.ply"], "two files of frame 1"),
+        ] {
+            let message = names(files).expect_err("no sequence").to_string();
+            assert!(message.contains(reason), "{files:?}: {message}");
+        }
+        let many = names(&["f99999999999999999999.ply", "f1.ply", "f2.ply"]).expect("a sequence");
+        assert_eq!(many, ["f1.ply", "f2.ply"], "a number that is too large is none");
+    }
+}

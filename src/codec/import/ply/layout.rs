@@ -34,7 +34,7 @@ impl Layout {
     pub(super) fn of(tables: &[Table<'_>]) -> Result<Self, ImportError> {
         let Some(vertex) = tables.iter().find(|table| table.name == "vertex") else {
             return Err(ImportError::unsupported(
-                "is a PLY file without the element vertex, so that it has no Gaussians",
+                "is a PLY file without vertices that are plain numbers, so that it has no Gaussians",
             ));
         };
         let has = |names: &[&str]| names.iter().all(|name| vertex.has(name));

@@ -112,13 +112,12 @@ fn damaged_headers_are_refused_with_the_line() {
         ("element vertex 1", "element vertex 18446744073709551615", "the file is cut"),
         ("element vertex 1", "element vertex 99999999999999999999", "element vertex 9"),
         ("property float x\n", "property float x\nsurprise\n", "surprise"),
-        ("property float scale_1\n", "property list int float scale_1\n", "file is cut"),
-        ("property float x\n", "", "place of a number"),
+        ("property float scale_1\n", "property list uchar float scale_1\n", "place of a number"),
+        ("property float x\n", "", "no property x"),
     ] {
         assert!(text.contains(from), "the file has {from}");
         let message = refusal(text.replacen(from, to, 1).as_bytes());
-        let is_named = message.contains(reason) || message.contains("has no") || message.contains("cut");
-        assert!(is_named, "{to:?} in place of {from:?}: {message}");
+        assert!(message.contains(reason), "{to:?} in place of {from:?}: {message}");
     }
     let huge = "ply\nformat binary_little_endian 1.0\nelement vertex 4000000000000\nproperty float x\nend_header\n";
     assert!(refusal(huge.as_bytes()).contains("cut"), "a number of rows that the file does not have");
@@ -142,7 +141,7 @@ fn other_files_are_refused_with_the_way_out() {
     let full = File::splats(1, 0).with("motion_0", |_| 0.0).with("f_t_0", |_| 0.0);
     assert!(refusal(&full.little()).contains("\"lite\""), "Spacetime Gaussians with a network");
     let text = String::from_utf8(File::splats(1, 0).ascii()).expect("text").replace("element vertex", "element point");
-    assert!(refusal(text.as_bytes()).contains("without the element vertex"), "no vertices");
+    assert!(refusal(text.as_bytes()).contains("without vertices"), "no vertices");
     let odd = File::splats(1, 10);
     assert!(refusal(&odd.little()).contains("10 properties f_rest"), "no degree of color");
     let degree_4 = read(&File::splats(1, 72).little());
