@@ -6,7 +6,9 @@
 pub(crate) mod columns;
 mod error;
 mod imported;
+pub(crate) mod placed;
 pub(crate) mod source;
+pub(crate) mod spz;
 
 pub use error::ImportError;
 pub(crate) use imported::Imported;
