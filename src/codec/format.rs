@@ -7,7 +7,7 @@ use super::checkpoint;
 use super::error::CodecErrorKind;
 use super::fourdgs;
 use super::import::source::Source;
-use super::import::{ImportError, Imported, npz, ply, sequence, splat, splatv};
+use super::import::{ImportError, Imported, npz, ply, sequence, splat, splatv, spz};
 use super::options::ReadOptions;
 use super::package::{self, PackageInfo, WriteSettings};
 use super::start::{Start, ZIP};
@@ -66,6 +66,15 @@ pub const FORMATS: &[Format] = &[
         read: Read::File(read_package),
         write: Some(write_package),
         inspect: Some(inspect_package),
+    },
+    Format {
+        id: "spz",
+        name: "an SPZ file (.spz)",
+        extensions: &["spz"],
+        is_of: spz::is_of,
+        read: Read::Bytes(spz::read),
+        write: None,
+        inspect: None,
     },
     Format {
         id: "splatv",
@@ -189,8 +198,8 @@ mod tests {
 
     #[test]
     fn the_message_about_an_unknown_format_names_every_format() {
-        let expected = "neither a checkpoint of the 4DGS trainer (.pth, a zip archive), a package (.gs4d), \
-                        a capture of the player splaTV (.splatv), a capture of the 4dgs format (.4dgs), parameters of Dynamic 3D \
+        let expected = "neither a checkpoint of the 4DGS trainer (.pth, a zip archive), a package (.gs4d), an SPZ file (.spz), \\
+                        a capture of the player splaTV (.splatv), a capture of the 4dgs format (.4dgs), parameters of Dynamic 3D \\
                         Gaussians (.npz), a PLY of Gaussians (.ply), a folder of numbered PLY files nor a .splat file (.splat)";
         assert_eq!(unknown(), expected, "every format by name and extension");
     }

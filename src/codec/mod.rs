@@ -15,6 +15,7 @@ pub(crate) mod options;
 pub mod package;
 mod start;
 pub(crate) mod text;
+mod zstd_frames;
 
 pub use error::{CodecError, CodecErrorKind};
 pub use import::ImportError;

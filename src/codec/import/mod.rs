@@ -10,11 +10,13 @@ mod error;
 mod imported;
 pub(crate) mod in_pieces;
 pub(crate) mod npz;
+pub(crate) mod placed;
 pub(crate) mod ply;
 pub(crate) mod sequence;
 pub(crate) mod source;
 pub(crate) mod splat;
 pub(crate) mod splatv;
+pub(crate) mod spz;
 
 pub use error::ImportError;
 pub(crate) use imported::Imported;
