@@ -6,6 +6,7 @@
 
 pub mod checkpoint;
 mod error;
+pub(crate) mod export;
 pub(crate) mod format;
 pub(crate) mod import;
 mod options;

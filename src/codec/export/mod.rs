@@ -1,0 +1,16 @@
+//! Exports: from scenes to files of other makes.
+//!
+//! In: a [`GaussianScene`](crate::scene::GaussianScene), and for formats without motion a time. Out: the file, and what of the scene it does not
+//! show. `instant` and `moving` turn a scene into [`Columns`](super::import::columns::Columns), each format is one file that writes these,
+//! `table` lists the formats.
+
+mod error;
+pub(crate) mod instant;
+pub(crate) mod lost;
+pub(crate) mod moving;
+mod ply;
+mod splat;
+mod still;
+pub(crate) mod table;
+
+pub(crate) use error::ExportError;

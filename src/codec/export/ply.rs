@@ -1,0 +1,100 @@
+//! PLY files of Gaussians: those of 3DGS, and those of FreeTimeGS with motion.
+//!
+//! In: [`Columns`]. Out: binary little-endian floats, with the properties of the original trainer in its order.
+
+use super::table::Clip;
+use crate::codec::import::columns::{Columns, Motion};
+use std::io::{self, Write};
+
+/// The name, and the default, of the shortest lifespan: lifespans are exported as they are.
+const SHORTEST: &str = "min_duration 0";
+/// The temporal deviation of a Gaussian that is present at every time, in clips: its marginal is 1 in single precision.
+const ALWAYS: f32 = 1e4;
+
+/// Writes Gaussians at rest as 3DGS trainers do.
+///
+/// # Errors
+/// Errors of the writer.
+pub(super) fn write_instant(columns: &Columns, _: &Clip, writer: &mut dyn Write) -> io::Result<()> {
+    write_header(columns, &[], &[], writer)?;
+    let mut record = Vec::new();
+    for index in 0..columns.len() {
+        record.clear();
+        push_still(columns, index, &mut record);
+        writer.write_all(bytes(&mut record))?;
+    }
+    Ok(())
+}
+
+/// Writes moving Gaussians as FreeTimeGS does: times and lifespans are parts of the clip.
+///
+/// # Errors
+/// Errors of the writer.
+pub(super) fn write_moving(columns: &Columns, clip: &Clip, writer: &mut dyn Write) -> io::Result<()> {
+    let [first, last] = clip.time_interval;
+    let span = last - first;
+    // Frames are at even steps from the first to the last moment, both included.
+    let frames = (f64::from(clip.duration_seconds) * f64::from(clip.fps)).round().max(1.0);
+    let comments = [
+        "ftgs_version 1".to_owned(),
+        "time_units normalized".to_owned(),
+        format!("sh_degree {}", columns.harmonics.degree),
+        "use_velocity true".to_owned(),
+        SHORTEST.to_owned(),
+        "opacity_floor 0".to_owned(),
+        format!("n_frames {frames}"),
+    ];
+    write_header(columns, &comments, &["time", "log_duration", "velocity_0", "velocity_1", "velocity_2"], writer)?;
+    let mut record = Vec::new();
+    for (index, &Motion { velocity, mean_t, sigma_t }) in columns.motion.iter().enumerate() {
+        record.clear();
+        push_still(columns, index, &mut record);
+        record.push((mean_t - first) / span);
+        record.push((sigma_t / span).min(ALWAYS).ln());
+        record.extend(velocity.map(|velocity| velocity * span));
+        writer.write_all(bytes(&mut record))?;
+    }
+    Ok(())
+}
+
+fn write_header(columns: &Columns, comments: &[String], more: &[&str], writer: &mut dyn Write) -> io::Result<()> {
+    let mut header = "ply\nformat binary_little_endian 1.0\n".to_owned();
+    for comment in comments {
+        header += &format!("comment {comment}\n");
+    }
+    header += &format!("element vertex {}\n", columns.len());
+    let rest = (columns.harmonics.coefficients - 1) * 3;
+    let counted = |stem: &str, count: usize| (0..count).map(|i| format!("{stem}_{i}")).collect::<Vec<_>>();
+    let mut names: Vec<String> = ["x", "y", "z", "nx", "ny", "nz"].map(str::to_owned).into();
+    names.extend(counted("f_dc", 3).into_iter().chain(counted("f_rest", rest)));
+    names.push("opacity".to_owned());
+    names.extend(counted("scale", 3).into_iter().chain(counted("rot", 4)));
+    names.extend(more.iter().map(|&name| name.to_owned()));
+    for name in names {
+        header += &format!("property float {name}\n");
+    }
+    writer.write_all((header + "end_header\n").as_bytes())
+}
+
+/// Appends the values that Gaussians at rest have. Coefficients above degree 0 are in the order of the trainer: all of red first.
+fn push_still(columns: &Columns, index: usize, record: &mut Vec<f32>) {
+    let colors = columns.harmonics.of(index);
+    let (first, rest) = colors.split_at(3);
+    record.extend(columns.mean[index]);
+    record.extend([0.0; 3]);
+    record.extend(first);
+    for channel in 0..3 {
+        record.extend(rest.iter().skip(channel).step_by(3));
+    }
+    record.push(columns.opacity_logit[index]);
+    record.extend(columns.log_scale[index]);
+    record.extend(columns.rotation[index]);
+}
+
+/// Returns the bytes of a record, which is changed to little-endian values.
+fn bytes(record: &mut [f32]) -> &[u8] {
+    for value in record.iter_mut() {
+        *value = f32::from_bits(value.to_bits().to_le());
+    }
+    bytemuck::cast_slice(record)
+}

@@ -1,0 +1,122 @@
+//! The table of the formats of other makes that captures are exported to.
+//!
+//! In: an id or an extension. Out: an [`Export`], with the function that writes its files. A further format is one new file in this folder and
+//! one row of [`EXPORTS`]; the function gets [`Columns`], so that it knows neither packed records nor harmonics in time.
+
+use super::{ply, splat};
+use crate::codec::import::columns::Columns;
+use crate::scene::UpAxis;
+use std::io::{self, Write};
+
+/// A format to export to: a row of the table.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Export {
+    /// One word for the format, the value of `--format`.
+    pub id: &'static str,
+    /// Description of a file of this format, with article and extension, for messages.
+    pub name: &'static str,
+    /// Extension of its files, without the first dot: `ply`, `ftgs.ply`.
+    pub extension: &'static str,
+    /// What a file holds, and the function that writes it.
+    pub what: What,
+    /// What the format cannot hold, whatever the capture: one sentence each.
+    pub lost: &'static [&'static str],
+}
+
+/// What a file of a format holds, and the function that writes it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum What {
+    /// The Gaussians at one time, at rest: [`Columns`] without motion and filter, as `instant::at` returns them.
+    Instant(Writer),
+    /// All Gaussians with [`Motion`](crate::codec::import::columns::Motion), without a filter, as `moving::moving` returns them. Captures whose
+    /// Gaussians only a filter switches on and off are refused before.
+    Moving(Writer),
+    /// As `Moving`, with the temporal filter of the capture if it has one: its intervals must be written too.
+    Windowed(Writer),
+}
+
+/// Writes the file of a format. Colors have time degree 0, opacities are finite logits, quaternions have any length but 0.
+pub(crate) type Writer = fn(&Columns, &Clip, &mut dyn Write) -> io::Result<()>;
+
+/// How the Gaussians of an export are played.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Clip {
+    /// First and last timestamp; those of the capture also in the file of one instant.
+    pub time_interval: [f32; 2],
+    /// Seconds of one pass through the interval; 0 for a still.
+    pub duration_seconds: f32,
+    /// Frames a second, for formats that count in frames.
+    pub fps: f32,
+    /// The axis of the capture that points up. Writers of formats with an axis of their own rotate the Gaussians, with their colors.
+    pub up: UpAxis,
+    /// The marginal at and below which a Gaussian is not drawn.
+    pub marginal_cutoff: f32,
+}
+
+/// All formats.
+pub(crate) const EXPORTS: &[Export] = &[
+    Export {
+        id: "ply",
+        name: "a 3DGS PLY (.ply)",
+        extension: "ply",
+        what: What::Instant(ply::write_instant),
+        lost: &[],
+    },
+    Export {
+        id: "free-time",
+        name: "a FreeTimeGS PLY (.ftgs.ply)",
+        extension: "ftgs.ply",
+        what: What::Moving(ply::write_moving),
+        lost: &["Players of FreeTimeGS have no cut-off: they draw the ends of lifespans that are not drawn here."],
+    },
+    Export {
+        id: "splat",
+        name: "a .splat file (.splat)",
+        extension: "splat",
+        what: What::Instant(splat::write),
+        lost: &[
+            "A .splat file has no view-dependent color: the coefficients above degree 0 are left out.",
+            "A .splat file has 256 values for each color channel, the opacity and each component of a rotation.",
+        ],
+    },
+];
+
+impl Export {
+    /// Returns the format with this id.
+    pub(crate) fn of_id(id: &str) -> Option<&'static Self> {
+        EXPORTS.iter().find(|export| export.id == id)
+    }
+
+    /// Returns the format of a file name: that with the longest extension that the name ends in.
+    pub(crate) fn of_name(name: &str) -> Option<&'static Self> {
+        let name = name.to_lowercase();
+        let ends_so = |export: &&Self| {
+            name.strip_suffix(export.extension).is_some_and(|stem| stem.len() > 1 && stem.ends_with('.'))
+        };
+        EXPORTS.iter().filter(ends_so).max_by_key(|export| export.extension.len())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_two_exports_have_the_same_id_or_extension() {
+        for (index, export) in EXPORTS.iter().enumerate() {
+            for other in &EXPORTS[index + 1..] {
+                let differ = export.id != other.id && export.extension != other.extension;
+                assert!(differ, "{} and {} are told apart", export.name, other.name);
+            }
+        }
+    }
+
+    #[test]
+    fn the_longest_extension_of_a_name_decides() {
+        let id = |name| Export::of_name(name).map(|export| export.id);
+        assert_eq!(id("a.ply"), Some("ply"), "the format of .ply");
+        assert_eq!(id("a.b.FTGS.ply"), Some("free-time"), "a longer extension, in any case");
+        assert_eq!(id("a.splat"), Some("splat"), "the format of .splat");
+        assert_eq!((id("ply"), id(".ply"), id("a.xply")), (None, None, None), "names without the extension");
+    }
+}
