@@ -6,7 +6,7 @@
 use super::checkpoint;
 use super::error::CodecErrorKind;
 use super::import::source::Source;
-use super::import::{ImportError, Imported};
+use super::import::{ImportError, Imported, splatv};
 use super::options::ReadOptions;
 use super::package::{self, PackageInfo, WriteSettings};
 use super::start::{Start, ZIP};
@@ -63,6 +63,15 @@ pub const FORMATS: &[Format] = &[
         read: Read::File(read_package),
         write: Some(write_package),
         inspect: Some(inspect_package),
+    },
+    Format {
+        id: "splatv",
+        name: "a capture of the player splaTV (.splatv)",
+        extensions: splatv::EXTENSIONS,
+        is_of: splatv::is_of,
+        read: Read::Bytes(splatv::read),
+        write: None,
+        inspect: None,
     },
 ];
 
@@ -125,7 +134,8 @@ mod tests {
 
     #[test]
     fn the_message_about_an_unknown_format_names_every_format() {
-        let expected = "neither a checkpoint of the 4DGS trainer (.pth, a zip archive) nor a package (.gs4d)";
+        let expected = "neither a checkpoint of the 4DGS trainer (.pth, a zip archive), a package (.gs4d) nor a capture of the player splaTV \
+                        (.splatv)";
         assert_eq!(unknown(), expected, "every format by name and extension");
     }
 

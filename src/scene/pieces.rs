@@ -74,8 +74,15 @@ pub(crate) struct Piece {
     pub velocity: [f32; 3],
     /// Temporal mean, timestamp units.
     pub mean_t: f32,
-    /// The middle of the times at which the piece is active, timestamp units.
-    pub middle: f32,
+    /// The first and the last time at which the piece is active, timestamp units.
+    pub times: [f32; 2],
+}
+
+impl Piece {
+    /// Returns the middle of its times.
+    pub(crate) fn middle(&self) -> f32 {
+        self.times[0].midpoint(self.times[1])
+    }
 }
 
 /// All pieces of all paths.
@@ -153,12 +160,12 @@ impl Splitting {
             let chord = |length| self.chord(&curve.position, first, first + length);
             let fits = |length| chord(length).error <= allowed;
             length = longest(shortest.min(end - first)..=end - first, length, fits);
-            let Chord { begins, velocity, error, times: [from, to] } = chord(length);
+            let Chord { begins, velocity, error, times } = chord(length);
             largest = largest.max(error);
-            let middle = ((from + to) / 2.0) as f32;
-            let mean_t = if curve.sigma_t.is_finite() { curve.mean_t } else { middle };
-            let mean = (begins + velocity * (f64::from(mean_t) - from)).as_vec3().to_array();
-            found.pieces.push(Piece { source, mean, velocity: velocity.as_vec3().to_array(), mean_t, middle });
+            let mean_t = if curve.sigma_t.is_finite() { curve.mean_t } else { times[0].midpoint(times[1]) as f32 };
+            let mean = (begins + velocity * (f64::from(mean_t) - times[0])).as_vec3().to_array();
+            let (velocity, times) = (velocity.as_vec3().to_array(), times.map(|time| time as f32));
+            found.pieces.push(Piece { source, mean, velocity, mean_t, times });
             found.intervals.push(first | (first + length - 1) << 16);
             first += length;
         }

@@ -4,9 +4,12 @@
 //! not show. Each format is one file here, which fills [`Columns`] and calls [`Columns::into_scene`]; `super::format` has the table of formats.
 
 pub(crate) mod columns;
+mod cubic;
 mod error;
 mod imported;
+mod in_pieces;
 pub(crate) mod source;
+pub(crate) mod splatv;
 
 pub use error::ImportError;
 pub(crate) use imported::Imported;
