@@ -6,7 +6,7 @@
 use super::checkpoint;
 use super::error::CodecErrorKind;
 use super::import::source::Source;
-use super::import::{ImportError, Imported, splatv};
+use super::import::{ImportError, Imported, sog, splatv};
 use super::options::ReadOptions;
 use super::package::{self, PackageInfo, WriteSettings};
 use super::start::{Start, ZIP};
@@ -73,6 +73,15 @@ pub const FORMATS: &[Format] = &[
         write: None,
         inspect: None,
     },
+    Format {
+        id: "sog",
+        name: "a SOG (.sog, .sogst, .sog4d, .tsog, or the meta.json or lod-meta.json of one)",
+        extensions: sog::EXTENSIONS,
+        is_of: sog::is_of,
+        read: Read::Bytes(sog::read),
+        write: None,
+        inspect: None,
+    },
 ];
 
 impl Format {
@@ -134,8 +143,8 @@ mod tests {
 
     #[test]
     fn the_message_about_an_unknown_format_names_every_format() {
-        let expected = "neither a checkpoint of the 4DGS trainer (.pth, a zip archive), a package (.gs4d) nor a capture of the player splaTV \
-                        (.splatv)";
+        let expected = "neither a checkpoint of the 4DGS trainer (.pth, a zip archive), a package (.gs4d), a capture of the player splaTV \
+                        (.splatv) nor a SOG (.sog, .sogst, .sog4d, .tsog, or the meta.json or lod-meta.json of one)";
         assert_eq!(unknown(), expected, "every format by name and extension");
     }
 

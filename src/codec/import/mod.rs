@@ -8,6 +8,7 @@ mod cubic;
 mod error;
 mod imported;
 mod in_pieces;
+pub(crate) mod sog;
 pub(crate) mod source;
 pub(crate) mod splatv;
 
