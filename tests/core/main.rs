@@ -28,6 +28,7 @@ mod scene_parts;
 mod score;
 #[cfg(feature = "offline")]
 mod score_formula;
+mod sog;
 mod thin;
 
 #[path = "../support"]

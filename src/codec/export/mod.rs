@@ -9,6 +9,7 @@ pub(crate) mod instant;
 pub(crate) mod lost;
 pub(crate) mod moving;
 mod ply;
+mod sog;
 mod splat;
 mod still;
 pub(crate) mod table;

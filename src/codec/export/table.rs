@@ -3,7 +3,7 @@
 //! In: an id or an extension. Out: an [`Export`], with the function that writes its files. A further format is one new file in this folder and
 //! one row of [`EXPORTS`]; the function gets [`Columns`], so that it knows neither packed records nor harmonics in time.
 
-use super::{ply, splat};
+use super::{ply, sog, splat};
 use crate::codec::import::columns::Columns;
 use crate::scene::UpAxis;
 use std::io::{self, Write};
@@ -53,6 +53,10 @@ pub(crate) struct Clip {
     pub marginal_cutoff: f32,
 }
 
+/// What all formats of the SOG family lose.
+const SOG: &str = "Scales and colors have 256 values, rotations 256 for each component, and at most 65,536 sets of coefficients above degree 0 are \
+                   kept; players take -Y as the axis that points up.";
+
 /// All formats.
 pub(crate) const EXPORTS: &[Export] = &[
     Export {
@@ -78,6 +82,20 @@ pub(crate) const EXPORTS: &[Export] = &[
             "A .splat file has no view-dependent color: the coefficients above degree 0 are left out.",
             "A .splat file has 256 values for each color channel, the opacity and each component of a rotation.",
         ],
+    },
+    Export {
+        id: "sog",
+        name: "a SOG of PlayCanvas (.sog)",
+        extension: "sog",
+        what: What::Instant(sog::write_sog),
+        lost: &[SOG],
+    },
+    Export {
+        id: "sogst",
+        name: "a SOG with motion (.sogst)",
+        extension: "sogst",
+        what: What::Moving(sog::write_sogst),
+        lost: &[SOG, "A .sogst file has 256 times and 256 lifespans; paths stay exact. Its players have no cut-off."],
     },
 ];
 

@@ -90,7 +90,7 @@ struct Reading {
 }
 
 /// Gaussians of a group, and the factors of the square of time of their paths if there are any.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Group {
     columns: Columns,
     accel: Vec<[f32; 3]>,
@@ -215,7 +215,7 @@ impl Reading {
                 Some(all) => all.append(group),
             }
         }
-        Ok(all.unwrap_or_default())
+        Ok(all.unwrap_or_else(|| Group { columns: Columns::with_capacity(0, 0), accel: Vec::new() }))
     }
 
     /// Returns the names of the textures of a group.
