@@ -7,7 +7,7 @@ use super::checkpoint;
 use super::error::CodecErrorKind;
 use super::fourdgs;
 use super::import::source::Source;
-use super::import::{ImportError, Imported, npz, ply, sequence, splat, splatv, spz};
+use super::import::{ImportError, Imported, npz, ply, sequence, sog, splat, splatv, spz};
 use super::options::ReadOptions;
 use super::package::{self, PackageInfo, WriteSettings};
 use super::start::{Start, ZIP};
@@ -82,6 +82,15 @@ pub const FORMATS: &[Format] = &[
         extensions: splatv::EXTENSIONS,
         is_of: splatv::is_of,
         read: Read::Bytes(splatv::read),
+        write: None,
+        inspect: None,
+    },
+    Format {
+        id: "sog",
+        name: "a SOG (.sog, .sogst, .sog4d, .tsog, or the meta.json or lod-meta.json of one)",
+        extensions: sog::EXTENSIONS,
+        is_of: sog::is_of,
+        read: Read::Bytes(sog::read),
         write: None,
         inspect: None,
     },
@@ -198,9 +207,10 @@ mod tests {
 
     #[test]
     fn the_message_about_an_unknown_format_names_every_format() {
-        let expected = "neither a checkpoint of the 4DGS trainer (.pth, a zip archive), a package (.gs4d), an SPZ file (.spz), \\
-                        a capture of the player splaTV (.splatv), a capture of the 4dgs format (.4dgs), parameters of Dynamic 3D \\
-                        Gaussians (.npz), a PLY of Gaussians (.ply), a folder of numbered PLY files nor a .splat file (.splat)";
+        let expected = "neither a checkpoint of the 4DGS trainer (.pth, a zip archive), a package (.gs4d), an SPZ file (.spz), \
+                        a capture of the player splaTV (.splatv), a SOG (.sog, .sogst, .sog4d, .tsog, or the meta.json or lod-meta.json \
+                        of one), a capture of the 4dgs format (.4dgs), parameters of Dynamic 3D Gaussians (.npz), a PLY of Gaussians \
+                        (.ply), a folder of numbered PLY files nor a .splat file (.splat)";
         assert_eq!(unknown(), expected, "every format by name and extension");
     }
 

@@ -12,6 +12,7 @@ mod instant;
 mod lost;
 mod moving;
 mod ply;
+mod sog;
 mod splat;
 mod still;
 pub(crate) mod table;

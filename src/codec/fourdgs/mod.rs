@@ -10,9 +10,13 @@ mod refused;
 mod start;
 #[cfg(feature = "fourdgs")]
 mod tracks;
+#[cfg(feature = "fourdgs")]
+mod write;
 
 #[cfg(feature = "fourdgs")]
 pub(super) use read::read;
 #[cfg(not(feature = "fourdgs"))]
-pub(super) use refused::read;
+pub(super) use refused::{read, write};
 pub(super) use start::{EXTENSIONS, is_of};
+#[cfg(feature = "fourdgs")]
+pub(super) use write::write;

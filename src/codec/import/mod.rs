@@ -13,6 +13,7 @@ pub(crate) mod npz;
 pub(crate) mod placed;
 pub(crate) mod ply;
 pub(crate) mod sequence;
+pub(crate) mod sog;
 pub(crate) mod source;
 pub(crate) mod splat;
 pub(crate) mod splatv;
