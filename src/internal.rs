@@ -62,6 +62,20 @@ pub mod scene {
 
 /// Of [`codec`](crate::codec).
 pub mod codec {
+    use crate::codec::import::source::InMemory;
+    use crate::codec::{CodecErrorKind, ReadOptions};
+    use crate::scene::GaussianScene;
+    use std::path::Path;
+
+    /// Reads a capture of another make from bytes in memory, without options and without other files: the scene, and what it does not show.
+    ///
+    /// # Errors
+    /// As [`load`](crate::codec::load).
+    pub fn read_bytes(path: &Path, bytes: &[u8]) -> Result<(GaussianScene, Vec<String>), CodecErrorKind> {
+        let imported = crate::codec::read_bytes(path, bytes, &InMemory::default(), &ReadOptions::default())?;
+        Ok((imported.scene, imported.lost))
+    }
+
     /// Checkpoints.
     pub mod checkpoint {
         pub use crate::codec::checkpoint::options::*;

@@ -5,9 +5,9 @@
 
 use super::checkpoint;
 use super::error::CodecErrorKind;
+use super::fourdgs;
 use super::import::source::Source;
-use super::import::{ImportError, Imported};
-use super::import::{gltf, ply, sequence, splat, spz};
+use super::import::{ImportError, Imported, gltf, npz, ply, sequence, sog, splat, splatv, spz};
 use super::options::ReadOptions;
 use super::package::{self, PackageInfo, WriteSettings};
 use super::start::{Start, ZIP};
@@ -68,6 +68,51 @@ pub const FORMATS: &[Format] = &[
         inspect: Some(inspect_package),
     },
     Format {
+        id: "spz",
+        name: "an SPZ file (.spz)",
+        extensions: &["spz"],
+        is_of: spz::is_of,
+        read: Read::Bytes(spz::read),
+        write: None,
+        inspect: None,
+    },
+    Format {
+        id: "splatv",
+        name: "a capture of the player splaTV (.splatv)",
+        extensions: splatv::EXTENSIONS,
+        is_of: splatv::is_of,
+        read: Read::Bytes(splatv::read),
+        write: None,
+        inspect: None,
+    },
+    Format {
+        id: "sog",
+        name: "a SOG (.sog, .sogst, .sog4d, .tsog, or the meta.json or lod-meta.json of one)",
+        extensions: sog::EXTENSIONS,
+        is_of: sog::is_of,
+        read: Read::Bytes(sog::read),
+        write: None,
+        inspect: None,
+    },
+    Format {
+        id: "4dgs",
+        name: "a capture of the 4dgs format (.4dgs)",
+        extensions: fourdgs::EXTENSIONS,
+        is_of: fourdgs::is_of,
+        read: Read::Bytes(fourdgs::read),
+        write: None,
+        inspect: None,
+    },
+    Format {
+        id: "dynamic-3dgs",
+        name: "parameters of Dynamic 3D Gaussians (.npz)",
+        extensions: npz::EXTENSIONS,
+        is_of: npz::is_of,
+        read: Read::Bytes(npz::read),
+        write: None,
+        inspect: None,
+    },
+    Format {
         id: "ply",
         name: "a PLY of Gaussians (.ply)",
         extensions: &["ply", "ply4d"],
@@ -82,15 +127,6 @@ pub const FORMATS: &[Format] = &[
         extensions: &[],
         is_of: |start| sequence::is_sequence(&start.entries),
         read: Read::Folder(sequence::read_folder),
-        write: None,
-        inspect: None,
-    },
-    Format {
-        id: "spz",
-        name: "an SPZ file (.spz)",
-        extensions: &["spz"],
-        is_of: spz::is_of,
-        read: Read::Bytes(spz::read),
         write: None,
         inspect: None,
     },
@@ -180,7 +216,10 @@ mod tests {
 
     #[test]
     fn the_message_about_an_unknown_format_names_every_format() {
-        let expected = "neither a checkpoint of the 4DGS trainer (.pth, a zip archive), a package (.gs4d), a PLY of Gaussians (.ply), a folder of numbered PLY files, an SPZ file (.spz), a glTF file with Gaussians (.glb or .gltf) nor a .splat file (.splat)";
+        let expected = "neither a checkpoint of the 4DGS trainer (.pth, a zip archive), a package (.gs4d), an SPZ file (.spz), \
+                        a capture of the player splaTV (.splatv), a SOG (.sog, .sogst, .sog4d, .tsog, or the meta.json or lod-meta.json \
+                        of one), a capture of the 4dgs format (.4dgs), parameters of Dynamic 3D Gaussians (.npz), a PLY of Gaussians \
+                        (.ply), a folder of numbered PLY files, a glTF file with Gaussians (.glb or .gltf) nor a .splat file (.splat)";
         assert_eq!(unknown(), expected, "every format by name and extension");
     }
 

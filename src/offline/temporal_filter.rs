@@ -12,18 +12,18 @@ use super::{OfflineError, Progress, sliced};
 use crate::scene::{FilterKind, GaussianScene, RuntimeScene, TemporalFilter};
 use crate::view::{Camera, RasterFov, View};
 
-/// Every kind of filter with its name.
+/// Every kind of filter that can be computed, with its name.
 pub const FILTER_NAMES: [(&str, FilterKind); 3] =
     [("support", FilterKind::Support), ("interval", FilterKind::Interval), ("key-frame", FilterKind::KeyFrame)];
 
 /// Returns the name of a kind.
 pub fn filter_name(kind: FilterKind) -> &'static str {
-    FILTER_NAMES.iter().find(|(_, other)| *other == kind).map_or("support", |(name, _)| name)
+    FILTER_NAMES.iter().find(|(_, other)| *other == kind).map_or("window", |(name, _)| name)
 }
 
 /// Returns whether a kind of filter is computed from training views; the other kinds need only the Gaussians.
 pub fn needs_views(kind: FilterKind) -> bool {
-    kind != FilterKind::Support
+    matches!(kind, FilterKind::KeyFrame | FilterKind::Interval)
 }
 
 /// The number of key-frames of a filter, evenly spaced over the time interval, both ends included. Default: `Count(11)`.

@@ -20,8 +20,8 @@ pub enum FilterKind {
     /// views.
     #[default]
     Support,
-    /// The times at which each Gaussian exists, as files of other makes state them: part of the capture, which drawing without a filter would
-    /// change. Tools keep it.
+    /// The windows of time in which the capture itself has each Gaussian: frames of a sequence, pieces of a path. Without this filter, or with
+    /// another one, the capture is a different one.
     Window,
 }
 
@@ -92,6 +92,11 @@ impl TemporalFilter {
             return Self { sets, ..filter };
         }
         filter
+    }
+
+    /// Returns whether it is part of the capture, which no other filter, and no absence of one, may replace.
+    pub(crate) fn is_of_capture(&self) -> bool {
+        self.kind == FilterKind::Window
     }
 
     /// Checks that it is a filter of `count` Gaussians, and that intervals end within its segments.

@@ -15,6 +15,7 @@ mod moving;
 mod ply;
 #[cfg(test)]
 mod samples;
+mod sog;
 mod splat;
 mod spz;
 mod still;

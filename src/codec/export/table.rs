@@ -4,7 +4,8 @@
 //! one row of [`EXPORTS`]; the function gets [`Columns`], so that it knows neither packed records nor harmonics in time.
 
 pub(crate) use super::clip::Clip;
-use super::{gltf, ply, splat, spz, usd};
+use super::{gltf, ply, sog, splat, spz, usd};
+use crate::codec::fourdgs;
 use crate::codec::import::columns::Columns;
 use std::io::{self, Write};
 
@@ -37,6 +38,10 @@ pub(crate) enum What {
 
 /// Writes the file of a format. Colors have time degree 0, opacities are finite logits, quaternions have any length but 0.
 pub(crate) type Writer = fn(&Columns, &Clip, &mut dyn Write) -> io::Result<()>;
+
+/// What all formats of the SOG family lose.
+const SOG: &str = "Scales and colors have 256 values, rotations 256 for each component, and at most 65,536 sets of coefficients above degree 0 are \
+                   kept; players take -Y as the axis that points up.";
 
 /// All formats.
 pub const EXPORTS: &[Export] = &[
@@ -87,6 +92,30 @@ pub const EXPORTS: &[Export] = &[
         extension: "usda",
         what: What::Windowed(usd::write),
         lost: &[],
+    },
+    Export {
+        id: "sog",
+        name: "a SOG of PlayCanvas (.sog)",
+        extension: "sog",
+        what: What::Instant(sog::write_sog),
+        lost: &[SOG],
+    },
+    Export {
+        id: "sogst",
+        name: "a SOG with motion (.sogst)",
+        extension: "sogst",
+        what: What::Moving(sog::write_sogst),
+        lost: &[SOG, "A .sogst file has 256 times and 256 lifespans; paths stay exact. Its players have no cut-off."],
+    },
+    Export {
+        id: "4dgs",
+        name: "a .4dgs file (.4dgs)",
+        extension: "4dgs",
+        what: What::Windowed(fourdgs::write),
+        lost: &[
+            "A .4dgs file has 256 values for each color coefficient, and colors from 0 to 1.",
+            "A .4dgs file does not have the axis that points up.",
+        ],
     },
 ];
 

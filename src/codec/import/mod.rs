@@ -4,15 +4,20 @@
 //! not show. Each format is one file here, which fills [`Columns`] and calls [`Columns::into_scene`]; `super::format` has the table of formats.
 
 pub(crate) mod columns;
+mod cubic;
 pub(crate) mod drawable;
 mod error;
 pub(crate) mod gltf;
 mod imported;
+pub(crate) mod in_pieces;
+pub(crate) mod npz;
 pub(crate) mod placed;
 pub(crate) mod ply;
 pub(crate) mod sequence;
+pub(crate) mod sog;
 pub(crate) mod source;
 pub(crate) mod splat;
+pub(crate) mod splatv;
 pub(crate) mod spz;
 
 pub use error::ImportError;

@@ -12,10 +12,10 @@ use super::trainer::{StepGrowth, Trainer};
 use crate::offline::dataset::selection::even_subset;
 use crate::offline::metrics::SquaredError;
 use crate::offline::score::GpuEngine;
-use crate::offline::temporal_filter::{needs_views, seen_filter};
+use crate::offline::temporal_filter::seen_filter;
 use crate::offline::{OfflineError, Progress, sliced};
 use crate::renderer::{GpuError, Headless, ShaderChecks};
-use crate::scene::{GaussianScene, RuntimeScene, TemporalFilter, TrainedWith};
+use crate::scene::{FilterKind, GaussianScene, RuntimeScene, TemporalFilter, TrainedWith};
 use crate::view::{Background, Frame, View};
 use glam::Vec3;
 
@@ -60,10 +60,11 @@ impl<'a> Run<'a> {
             Some(_) => Background::Environment,
             None => Background::Color(scene.trained_with.background),
         };
-        let (used, support) = scene.filter.take().map_or((None, None), |filter| match needs_views(filter.kind) {
-            true => (Some(filter), None),
-            false => (None, Some(filter.segments)),
-        });
+        let (used, support) =
+            scene.filter.take().map_or((None, None), |filter| match filter.kind != FilterKind::Support {
+                true => (Some(filter), None),
+                false => (None, Some(filter.segments)),
+            });
         scene.filter = used;
         let mut trainer = Trainer::with_sums(headless, scene, settings.mode, settings.sums)?;
         trainer.set_terms(settings.terms)?;

@@ -118,7 +118,10 @@ impl GpuCapture {
                 return Err(GpuError::TooLarge { what: "the environment map", needed, limit });
             }
         }
-        let bits = scene.filter.as_ref().map_or(0, |filter| u64::from(filter.segments).div_ceil(8));
+        let bits = scene.filter.as_ref().map_or(0, |filter| match filter.sets {
+            ActiveSets::Bits(_) => u64::from(filter.segments).div_ceil(8),
+            ActiveSets::Intervals(_) => 4,
+        });
         let record = buffers::largest_record(form, stride).max(bits);
         let threads = u64::from(limits.max_compute_workgroups_per_dimension) * 256;
         // A multiple of the block that one workgroup of `activate` processes.

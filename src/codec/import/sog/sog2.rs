@@ -1,0 +1,162 @@
+//! SOG of PlayCanvas, versions 1 and 2: Gaussians at rest.
+//!
+//! In: `meta.json` and its textures. Out: a scene in the trained form, y down.
+
+use super::files::Files;
+use super::meta::{self, Images, Single, Wide};
+use super::splats::{self, Layout, Rest, Table};
+use super::textures;
+use crate::codec::import::columns::{Columns, Played};
+use crate::codec::import::{ImportError, Imported};
+use crate::codec::options::ReadOptions;
+use crate::codec::text::printable;
+use crate::scene::UpAxis;
+use serde::Deserialize;
+use serde_json::Value;
+use std::ops::Range;
+
+/// How PlayCanvas and the writers of SOG orient captures: as 3DGS trains them.
+pub(super) const UP: UpAxis = UpAxis::NegY;
+
+/// How the splats are to be drawn; only in version 2.
+#[derive(Debug, Clone, Deserialize)]
+struct Drawn {
+    model: Option<String>,
+}
+
+/// The attributes of version 1, which has no codebooks.
+#[derive(Debug, Clone, Deserialize)]
+struct First {
+    means: FirstMeans,
+    scales: Narrow<3>,
+    quats: Single,
+    sh0: Narrow<4>,
+    #[serde(rename = "shN")]
+    rest: Option<FirstRest>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+struct FirstMeans {
+    /// The number of Gaussians, first.
+    shape: Vec<u64>,
+    #[serde(flatten)]
+    wide: Wide,
+}
+
+/// Numbers of 8 bits, linear between limits for each channel.
+#[derive(Debug, Clone, Deserialize)]
+struct Narrow<const CHANNELS: usize> {
+    #[serde(with = "limits")]
+    mins: [f64; CHANNELS],
+    #[serde(with = "limits")]
+    maxs: [f64; CHANNELS],
+    files: [String; 1],
+}
+
+/// Centroids of 8 bits, linear between limits.
+#[derive(Debug, Clone, Deserialize)]
+struct FirstRest {
+    mins: f64,
+    maxs: f64,
+    files: [String; 2],
+}
+
+/// Arrays of any length, for which serde has no implementation.
+mod limits {
+    use serde::{Deserialize, Deserializer, de};
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>, const N: usize>(from: D) -> Result<[f64; N], D::Error> {
+        let values = Vec::<f64>::deserialize(from)?;
+        let length = values.len();
+        values.try_into().map_err(|_| de::Error::invalid_length(length, &"a limit for each channel"))
+    }
+}
+
+/// Gaussians at rest and what the scene does not show of them.
+pub(super) struct Still {
+    pub columns: Columns,
+    pub lost: Vec<String>,
+}
+
+/// Reads a scene.
+///
+/// # Errors
+/// As [`columns`]; invalid options.
+pub(super) fn read(files: &mut Files, meta: &Value, options: &ReadOptions) -> Result<Imported, ImportError> {
+    let Still { columns, lost } = columns(files, meta, None)?;
+    Ok(Imported { scene: columns.into_scene(Played::still(UP), options)?, lost })
+}
+
+/// Reads the Gaussians of one `meta.json`: those in the ranges given, or all.
+///
+/// # Errors
+/// Another version, a model that is not drawn; a file that is missing or damaged; a range beyond the end.
+pub(super) fn columns(files: &mut Files, meta: &Value, ranges: Option<&[Range<usize>]>) -> Result<Still, ImportError> {
+    let meta::Kind { version, .. } = meta::part("meta.json", meta)?;
+    let (count, layout) = match version {
+        None => first(meta)?,
+        Some(2) => {
+            let images: Images = meta::part("meta.json", meta)?;
+            (images.count, Layout::of_images(images)?)
+        }
+        Some(version) => {
+            return Err(ImportError::unsupported(format!(
+                "a SOG of version {version}, and only versions 1 and 2 are known; export it with splat-transform as PLY"
+            )));
+        }
+    };
+    let mut lost = Vec::new();
+    let Drawn { model } = meta::part("meta.json", meta)?;
+    match model.as_deref() {
+        None => {}
+        Some("antialiased") => lost.push(
+            "Its Gaussians were trained with anti-aliased splats, and are drawn with the dilation of the original code: edges are softer."
+                .to_owned(),
+        ),
+        Some(model) => {
+            let model = printable(model);
+            return Err(ImportError::unsupported(format!("a SOG of the model \"{model}\", whose splats are not 3D Gaussians")));
+        }
+    }
+    let centroids = layout.centroids(files)?;
+    let encoded = textures::read(files, layout.names())?;
+    let count = textures::check_count(count, &encoded)?;
+    let textures = textures::decode(&encoded, count)?;
+    let whole = [0..count];
+    let ranges = ranges.unwrap_or(&whole);
+    let wanted: usize = ranges.iter().map(Range::len).sum();
+    if wanted > count || ranges.iter().any(|range| range.end > count) {
+        return Err(ImportError::damaged(format!("it has {count} Gaussians, fewer than lod-meta.json states")));
+    }
+    let kept: Vec<u32> = ranges.iter().flat_map(|range| splats::visible(&textures, range.clone())).collect();
+    lost.extend(invisible(wanted - kept.len(), wanted));
+    Ok(Still { columns: layout.columns(&textures, &centroids, &kept)?, lost })
+}
+
+/// Returns the sentence about Gaussians of opacity 0, if there are any.
+pub(super) fn invisible(dropped: usize, all: usize) -> Option<String> {
+    (dropped > 0).then(|| format!("{dropped} of {all} Gaussians have the opacity 0 and are left out."))
+}
+
+/// Returns the number of Gaussians and the layout of version 1.
+fn first(meta: &Value) -> Result<(u64, Layout), ImportError> {
+    let First { means, scales, quats, sh0, rest } = meta::part("meta.json", meta)?;
+    let FirstMeans { shape, wide: means } = means;
+    let count =
+        *shape.first().ok_or_else(|| ImportError::damaged("its meta.json does not state how many means it has"))?;
+    let table = |least: f64, most: f64| {
+        let is_finite = [least, most].iter().all(|&limit| (limit as f32).is_finite());
+        let table = is_finite.then(|| Table::between(least, most));
+        table.ok_or_else(|| ImportError::damaged("its meta.json has a limit that is too large"))
+    };
+    let [x, y, z] = [0, 1, 2].map(|axis| table(scales.mins[axis], scales.maxs[axis]));
+    let [red, green, blue, opacity] = [0, 1, 2, 3].map(|channel| table(sh0.mins[channel], sh0.maxs[channel]));
+    let rest = rest.map(|FirstRest { mins, maxs, files: [centroids, labels] }| {
+        Ok::<_, ImportError>(Rest { centroids, labels, stated: None, values: table(mins, maxs)? })
+    });
+    let ([scales], [rotations], [colors]) = (scales.files, quats.files, sh0.files);
+    let (scale, color) = ([x?, y?, z?], [red?, green?, blue?]);
+    // Its opacities are logits.
+    let (opacity, rest) = (opacity?, rest.transpose()?);
+    Ok((count, Layout { means, scales, scale, rotations, colors, color, opacity, rest }))
+}
