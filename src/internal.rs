@@ -48,6 +48,7 @@ pub mod reference {
 pub mod scene {
     pub use crate::scene::detail::*;
     pub use crate::scene::filter::*;
+    pub use crate::scene::merge_neighbors::*;
 
     /// The packed form.
     pub mod packed {
