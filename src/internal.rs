@@ -68,6 +68,17 @@ pub mod codec {
     use crate::scene::GaussianScene;
     use std::path::Path;
 
+    pub use crate::codec::import::sequence::next as next_frame;
+
+    /// Reads the frames of a sequence, each the name and the bytes of a file, without options: the scene, and what it does not show.
+    ///
+    /// # Errors
+    /// As [`load`](crate::codec::load).
+    pub fn read_frames(frames: Vec<(String, Vec<u8>)>) -> Result<(GaussianScene, Vec<String>), CodecErrorKind> {
+        let imported = crate::codec::read_frames(frames, &ReadOptions::default())?;
+        Ok((imported.scene, imported.lost))
+    }
+
     /// Reads a capture of another make from bytes in memory, without options and without other files: the scene, and what it does not show.
     ///
     /// # Errors

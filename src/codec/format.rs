@@ -165,6 +165,15 @@ impl Format {
     }
 }
 
+/// Returns the extensions of files of other makes, without the dot.
+pub fn imported_extensions() -> Vec<&'static str> {
+    let imported = FORMATS.iter().filter(|format| matches!(format.read, Read::Bytes(_)));
+    let mut extensions: Vec<&str> = imported.flat_map(|format| format.extensions).copied().collect();
+    extensions.sort_unstable();
+    extensions.dedup();
+    extensions
+}
+
 /// Returns the message about a file of no known format.
 pub(super) fn unknown() -> String {
     let names: Vec<&str> = FORMATS.iter().map(|format| format.name).collect();

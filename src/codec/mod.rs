@@ -57,7 +57,7 @@ pub(crate) fn load_stating(path: &Path, options: &ReadOptions) -> Result<Importe
                 let mut bytes = Vec::new();
                 file.read_to_end(&mut bytes)?;
                 let folder = path.parent().unwrap_or(Path::new(""));
-                Ok(read(&Source { path, bytes: &bytes, beside: &InFolder(folder) }, options)?)
+                Ok(read(&Source { bytes: &bytes, beside: &InFolder(folder) }, options)?)
             }
             (Read::Folder(read), _) => Ok(read(path, options)?),
             (Read::File(_) | Read::Bytes(_), None) => Err(CodecErrorKind::UnknownFormat(format::unknown_folder())),
@@ -78,7 +78,7 @@ pub(crate) fn read_bytes(
 ) -> Result<Imported, CodecErrorKind> {
     let start = Start::of(&mut Cursor::new(bytes), path)?;
     match Format::of(&start).map(|format| format.read) {
-        Some(Read::Bytes(read)) => Ok(read(&Source { path, bytes, beside }, options)?),
+        Some(Read::Bytes(read)) => Ok(read(&Source { bytes, beside }, options)?),
         Some(Read::File(_) | Read::Folder(_)) | None => Err(CodecErrorKind::UnknownFormat(format::unknown())),
     }
 }
@@ -90,20 +90,6 @@ pub(crate) fn read_bytes(
 pub(crate) fn read_frames(frames: Vec<(String, Vec<u8>)>, options: &ReadOptions) -> Result<Imported, CodecErrorKind> {
     let frames = frames.into_iter().map(|(name, bytes)| sequence::Frame { name, bytes: Box::new(move || Ok(bytes)) });
     Ok(sequence::read(frames, options)?)
-}
-
-/// Returns the name of the file of a sequence that follows one of this name; `None` for a name without a number.
-pub(crate) fn next_frame(name: &str) -> Option<String> {
-    sequence::next(name)
-}
-
-/// Returns the extensions of files of other makes, without the dot.
-pub(crate) fn imported_extensions() -> Vec<&'static str> {
-    let imported = FORMATS.iter().filter(|format| matches!(format.read, Read::Bytes(_)));
-    let mut extensions: Vec<&str> = imported.flat_map(|format| format.extensions).copied().collect();
-    extensions.sort_unstable();
-    extensions.dedup();
-    extensions
 }
 
 /// Returns the format of a file. If the files of that format have sections, all checksums are verified, and the header

@@ -231,7 +231,7 @@ mod tests {
     }
 
     fn read_file(bytes: &[u8]) -> Result<Imported, ImportError> {
-        let source = Source { path: Path::new("a.4dgs"), bytes, beside: &InMemory::default() };
+        let source = Source { bytes, beside: &InMemory::default() };
         read(&source, &ReadOptions::default())
     }
 

@@ -118,7 +118,7 @@ mod tests {
         };
         let mut bytes = Vec::new();
         write(&columns, &clip, &mut bytes).expect("a scene that fits");
-        let source = Source { path: Path::new("a.4dgs"), bytes: &bytes, beside: &InMemory::default() };
+        let source = Source { bytes: &bytes, beside: &InMemory::default() };
         let found = read(&source, &ReadOptions::default()).expect("a whole file");
         let SceneForm::Ready(Form::Sliced(sliced)) = &found.scene.form else { panic!("sliced") };
         let filter = found.scene.filter.as_ref().expect("windows");

@@ -220,7 +220,7 @@ mod tests {
     }
 
     fn read_file(bytes: &[u8]) -> Result<Imported, ImportError> {
-        let source = Source { path: Path::new("params.npz"), bytes, beside: &InMemory::default() };
+        let source = Source { bytes, beside: &InMemory::default() };
         read(&source, &ReadOptions::default())
     }
 

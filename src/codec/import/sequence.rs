@@ -90,7 +90,7 @@ fn at(name: &str, error: ImportError) -> ImportError {
 
 /// Returns the name of the file that follows a frame: its number is one higher, with the same number of digits, or one more after 9, 99 and so
 /// on. Returns `None` for a name without a number.
-pub(crate) fn next(name: &str) -> Option<String> {
+pub fn next(name: &str) -> Option<String> {
     let (beginning, number) = number(name)?;
     let ending = name.strip_prefix(beginning)?.trim_start_matches(|c: char| c.is_ascii_digit());
     let digits = name.len() - beginning.len() - ending.len();

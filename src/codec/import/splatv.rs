@@ -110,7 +110,7 @@ mod tests {
     }
 
     fn read_file(bytes: &[u8], options: &ReadOptions) -> Result<Imported, ImportError> {
-        read(&Source { path: Path::new("a.splatv"), bytes, beside: &InMemory::default() }, options)
+        read(&Source { bytes, beside: &InMemory::default() }, options)
     }
 
     const PARTS: &str = r#"[{"type":"splat","size":4096,"texwidth":4096,"texheight":1,"cameras":[]}]"#;

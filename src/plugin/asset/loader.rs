@@ -6,6 +6,8 @@
 //! Bevy adds the path.
 
 use crate::codec::checkpoint::{self, CheckpointError};
+use crate::codec::format::imported_extensions;
+use crate::codec::import::sequence::next as next_frame;
 use crate::codec::import::source::{Beside, InMemory};
 use crate::codec::import::{ImportError, Imported};
 use crate::codec::package::{self, PackageError};
@@ -177,7 +179,7 @@ impl AssetLoader for ImportLoader {
     }
 
     fn extensions(&self) -> &[&str] {
-        static EXTENSIONS: LazyLock<Vec<&'static str>> = LazyLock::new(codec::imported_extensions);
+        static EXTENSIONS: LazyLock<Vec<&'static str>> = LazyLock::new(imported_extensions);
         &EXTENSIONS
     }
 }
@@ -230,7 +232,7 @@ async fn frames(
 ) -> Result<Vec<(String, Vec<u8>)>, CaptureLoadError> {
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let mut frames = vec![(name, first)];
-    while let Some(next) = codec::next_frame(&frames[frames.len() - 1].0) {
+    while let Some(next) = next_frame(&frames[frames.len() - 1].0) {
         let file = beside(context, &next);
         let Ok(bytes) = context.read_asset_bytes(file).await else { break };
         frames.push((next, bytes));

@@ -65,7 +65,7 @@ fn written(id: &str, columns: &Columns) -> Vec<u8> {
 }
 
 fn read(bytes: &[u8]) -> Result<Imported, String> {
-    let source = Source { path: Path::new("a.sogst"), bytes, beside: &InMemory::default() };
+    let source = Source { bytes, beside: &InMemory::default() };
     sog::read(&source, &ReadOptions::default()).map_err(|error| error.to_string())
 }
 

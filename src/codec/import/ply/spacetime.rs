@@ -67,7 +67,7 @@ mod tests {
 
     /// Reads a file and returns the active mean of its only path at some times, and the red coefficient.
     fn path(bytes: &[u8], interval: [f32; 2]) -> (Vec<(f32, Vec3)>, f32) {
-        let source = Source { path: Path::new("a.ply"), bytes, beside: &InMemory::default() };
+        let source = Source { bytes, beside: &InMemory::default() };
         let found = super::super::read(&source, &ReadOptions::default()).expect("a whole file");
         let SceneForm::Ready(Form::Sliced(sliced)) = &found.scene.form else { panic!("moving Gaussians are sliced") };
         let filter = found.scene.filter.as_ref().expect("pieces have a filter");
