@@ -161,7 +161,6 @@ mod tests {
     use crate::codec::import::source::{InMemory, Source};
     use crate::codec::options::ReadOptions;
     use crate::scene::{SceneForm, Trained, UpAxis};
-    use std::path::Path;
 
     fn read_back(columns: &Columns, up: UpAxis) -> Columns {
         let mut bytes = Vec::new();

@@ -203,7 +203,6 @@ mod tests {
     use crate::gaussian::Gaussian;
     use crate::scene::{Form, SceneForm};
     use fourdgs::{SceneExtras, WriteOptions, write_to_vec};
-    use std::path::Path;
 
     /// Returns a file of 3 s with 40 Gaussians. Each exists during half a second if `windows` is set.
     fn file(windows: bool, extra: Vec<Vec<u8>>) -> (GaussianSet, Vec<u8>) {

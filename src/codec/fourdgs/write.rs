@@ -93,7 +93,6 @@ mod tests {
     use crate::codec::import::source::{InMemory, Source};
     use crate::codec::options::ReadOptions;
     use crate::scene::{FilterKind, Form, SceneForm, TemporalFilter, UpAxis};
-    use std::path::Path;
 
     #[test]
     fn a_written_file_is_read_as_the_same_gaussians() {

@@ -175,7 +175,6 @@ mod tests {
     use crate::gaussian::Gaussian;
     use crate::scene::{Form, SceneForm};
     use std::io::Write;
-    use std::path::Path;
     use zip::write::SimpleFileOptions;
 
     const FRAMES: usize = 11;

@@ -85,7 +85,6 @@ mod tests {
     use super::*;
     use crate::codec::import::source::InMemory;
     use crate::scene::{Form, GaussianScene, SceneForm, UpAxis};
-    use std::path::Path;
 
     /// Returns the record of a red splat with these factors of its motion.
     fn record(motion: [f32; 9], turn: f32, width: f32) -> Vec<u8> {

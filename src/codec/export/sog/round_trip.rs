@@ -14,7 +14,6 @@ use crate::scene::{Form, GaussianScene, SceneForm, Sliced, UpAxis};
 use glam::Vec3;
 use serde_json::{Value, json};
 use std::io::{Cursor, Read};
-use std::path::Path;
 use zip::ZipArchive;
 
 /// Gaussians in three clumps, most of them short, one in 50 at rest and always there.

@@ -6,7 +6,6 @@ use super::read;
 use crate::codec::import::source::{InMemory, Source};
 use crate::codec::import::{ImportError, Imported};
 use crate::codec::options::ReadOptions;
-use std::path::Path;
 
 /// A file with one element.
 #[derive(Debug, Clone, Default)]

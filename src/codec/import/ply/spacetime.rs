@@ -63,7 +63,6 @@ mod tests {
     use crate::codec::import::source::{InMemory, Source};
     use crate::scene::{Form, SceneForm};
     use glam::Vec3;
-    use std::path::Path;
 
     /// Reads a file and returns the active mean of its only path at some times, and the red coefficient.
     fn path(bytes: &[u8], interval: [f32; 2]) -> (Vec<(f32, Vec3)>, f32) {
