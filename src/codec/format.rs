@@ -162,7 +162,8 @@ mod tests {
 
     #[test]
     fn the_message_about_an_unknown_format_names_every_format() {
-        let expected = "neither a checkpoint of the 4DGS trainer (.pth, a zip archive), a package (.gs4d), a PLY of Gaussians (.ply), a folder of numbered PLY files nor a .splat file (.splat)";
+        let expected = "neither a checkpoint of the 4DGS trainer (.pth, a zip archive), a package (.gs4d), a PLY of Gaussians (.ply), \
+                        a folder of numbered PLY files nor a .splat file (.splat)";
         assert_eq!(unknown(), expected, "every format by name and extension");
     }
 
