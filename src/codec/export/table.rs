@@ -88,6 +88,13 @@ pub const EXPORTS: &[Export] = &[
         what: What::Windowed(usd::write),
         lost: &[],
     },
+    Export {
+        id: "usd-frame",
+        name: "an OpenUSD text file of one time (.frame.usda)",
+        extension: "frame.usda",
+        what: What::Instant(usd::write),
+        lost: &[],
+    },
 ];
 
 impl Export {
