@@ -117,6 +117,13 @@ pub const EXPORTS: &[Export] = &[
             "A .4dgs file does not have the axis that points up.",
         ],
     },
+    Export {
+        id: "usd-frame",
+        name: "an OpenUSD text file of one time (.frame.usda)",
+        extension: "frame.usda",
+        what: What::Instant(usd::write),
+        lost: &[],
+    },
 ];
 
 impl Export {

@@ -107,16 +107,20 @@ fn parts(accessors: &Accessors<'_>, lost: &mut Vec<String>) -> Result<Vec<Column
     if parts.is_empty() {
         return Err(ImportError::unsupported("no node of its scene shows a primitive with KHR_gaussian_splatting"));
     }
-    let mut state = |count: usize, sentence: &str| {
+    let mut state = |before: &str, count: usize, after: &str| {
         if count > 0 {
-            lost.push(format!("{count} {sentence}"));
+            lost.push(format!("{before}{count}{after}"));
         }
     };
-    state(linear, "Gaussians have linear colors, encoded as sRGB and blended so: overlaps look slightly different.");
-    state(sheared, "Gaussians are stretched by their nodes: colors that depend on the direction are only turned.");
-    state(tangential, "Gaussians are meant for another projection than perspective, by which they are drawn.");
-    state(others, "primitives without Gaussians are left out.");
-    state(moved, "nodes move in an animation: their Gaussians stand where the first key frame puts them.");
+    state(
+        "",
+        linear,
+        " Gaussians have linear colors; encoded as sRGB and blended so, overlaps look slightly different.",
+    );
+    state("", sheared, " Gaussians are stretched by their nodes; colors that depend on the direction are only turned.");
+    state("", tangential, " Gaussians are meant for another projection than perspective, by which they are drawn.");
+    state("Primitives without Gaussians are left out (", others, ").");
+    state("Animations are left out: the nodes that move (", moved, ") stand where the first key frame puts them.");
     Ok(parts)
 }
 
@@ -388,7 +392,7 @@ mod tests {
                 }]);
             });
             let found = found.expect("an animation");
-            assert!(found.lost[0].starts_with("1 nodes move"), "stated: {:?}", found.lost);
+            assert!(found.lost[0].starts_with("Animations are left out"), "stated: {:?}", found.lost);
             let expected = [1.0 + row[0], 2.0 + row[1], 3.0 + row[2]];
             assert_eq!(trained(found).parameters.mean[0], expected, "{interpolation}");
         }
