@@ -66,6 +66,12 @@ pub mod codec {
     pub mod checkpoint {
         pub use crate::codec::checkpoint::options::*;
     }
+    /// Exports.
+    pub mod export {
+        pub use crate::codec::export::error::*;
+        pub use crate::codec::export::exporter::*;
+        pub use crate::codec::export::table::*;
+    }
     /// The table of formats.
     pub mod format {
         pub use crate::codec::format::*;

@@ -13,6 +13,7 @@ use crate::codec::package::{PackageInfo, StoredForm, StoredLevel};
 use crate::codec::text::printable;
 use crate::gaussian::Model;
 use crate::offline::convert::form_name;
+use crate::offline::dataset::Dataset;
 use crate::scene::packed::MAX_STAGES;
 use crate::scene::{Bounds, ColorDegrees, GaussianScene, Level, PlaybackHints, SceneForm, TrainedWith};
 use glam::Vec3;
@@ -22,7 +23,7 @@ use std::collections::HashMap;
 use std::fmt;
 use std::path::PathBuf;
 
-/// Show the contents of a checkpoint (.pth), a package (.gs4d) or a dataset (a folder), and verify all checksums of a package.
+/// Show the contents of a capture (a file, or the folder of a sequence) or a dataset (a folder), and verify all checksums of a package.
 ///
 /// The exit code is 2 if a checksum is wrong or a Gaussian cannot be drawn.
 #[derive(clap::Args)]
@@ -32,7 +33,7 @@ Examples:
   gs4d info chkpnt30000.pth --time-interval 0,10 --json
   gs4d info dataset --cameras cameras.png")]
 pub(super) struct Info {
-    /// The checkpoint, the package, or the folder of a dataset.
+    /// The capture, or the folder of a dataset.
     #[arg(value_name = "FILE")]
     file: PathBuf,
     /// Draw the cameras of a dataset into this picture, from above and from the side.
@@ -79,7 +80,7 @@ impl Info {
     /// # Errors
     /// The file cannot be read. If sections are damaged or a Gaussian cannot be drawn, the result is a report with a failure.
     pub(super) fn run(&self) -> Result<Report, Failure> {
-        if self.file.is_dir() {
+        if self.file.is_dir() && (Dataset::format(&self.file).is_some() || codec::inspect(&self.file).is_err()) {
             return info_dataset::run(&self.file, self.cameras.as_deref());
         }
         if self.cameras.is_some() {

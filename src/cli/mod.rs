@@ -16,6 +16,7 @@ mod convert;
 mod curve;
 mod detail;
 mod eval;
+mod export;
 mod failure;
 mod fine_tune;
 mod info;
@@ -70,6 +71,7 @@ Every verb explains itself: gs4d VERB --help. Exit codes: 0 done, 2 failed, 130 
 enum Verb {
     Info(info::Info),
     Convert(convert::Convert),
+    Export(export::ExportVerb),
     Render(render::Render),
     Compress(compress::Compress),
     Detail(detail::Detail),
@@ -92,6 +94,7 @@ impl Verb {
         match self {
             Self::Info(verb) => verb.run(),
             Self::Convert(verb) => verb.run(),
+            Self::Export(verb) => verb.run(),
             Self::Render(verb) => verb.run(),
             Self::Compress(verb) => verb.run(),
             Self::Detail(verb) => verb.run(),

@@ -6,7 +6,8 @@
 use super::checkpoint;
 use super::error::CodecErrorKind;
 use super::import::source::Source;
-use super::import::{ImportError, Imported, sog, splatv};
+use super::import::{ImportError, Imported};
+use super::import::{gltf, ply, sequence, sog, splat, splatv, spz};
 use super::options::ReadOptions;
 use super::package::{self, PackageInfo, WriteSettings};
 use super::start::{Start, ZIP};
@@ -42,6 +43,8 @@ pub(crate) enum Read {
     File(fn(&Path, BufReader<File>, &ReadOptions) -> Result<GaussianScene, CodecErrorKind>),
     /// From its bytes in memory.
     Bytes(fn(&Source<'_>, &ReadOptions) -> Result<Imported, ImportError>),
+    /// From the files of the folder at a path.
+    Folder(fn(&Path, &ReadOptions) -> Result<Imported, ImportError>),
 }
 
 /// All formats.
@@ -74,6 +77,15 @@ pub const FORMATS: &[Format] = &[
         inspect: None,
     },
     Format {
+        id: "ply",
+        name: "a PLY of Gaussians (.ply)",
+        extensions: &["ply", "ply4d"],
+        is_of: |start| ply::is_ply(&start.bytes),
+        read: Read::Bytes(ply::read),
+        write: None,
+        inspect: None,
+    },
+    Format {
         id: "sog",
         name: "a SOG (.sog, .sogst, .sog4d, .tsog, or the meta.json or lod-meta.json of one)",
         extensions: sog::EXTENSIONS,
@@ -82,12 +94,50 @@ pub const FORMATS: &[Format] = &[
         write: None,
         inspect: None,
     },
+    Format {
+        id: "sequence",
+        name: "a folder of numbered PLY files",
+        extensions: &[],
+        is_of: |start| sequence::is_sequence(&start.entries),
+        read: Read::Folder(sequence::read_folder),
+        write: None,
+        inspect: None,
+    },
+    Format {
+        id: "spz",
+        name: "an SPZ file (.spz)",
+        extensions: &["spz"],
+        is_of: spz::is_of,
+        read: Read::Bytes(spz::read),
+        write: None,
+        inspect: None,
+    },
+    Format {
+        id: "gltf",
+        name: "a glTF file with Gaussians (.glb or .gltf)",
+        extensions: &["glb", "gltf"],
+        is_of: gltf::is_of,
+        read: Read::Bytes(gltf::read),
+        write: None,
+        inspect: None,
+    },
+    // The last row: nothing in such a file tells its format.
+    Format {
+        id: "splat",
+        name: "a .splat file (.splat)",
+        extensions: &["splat"],
+        is_of: |start| start.extension == "splat" && !start.bytes.is_empty(),
+        read: Read::Bytes(splat::read),
+        write: None,
+        inspect: None,
+    },
 ];
 
 impl Format {
     /// Returns the format of a file that starts so; `None` if no format does.
     pub(crate) fn of(start: &Start) -> Option<Self> {
-        FORMATS.iter().copied().find(|format| (format.is_of)(start))
+        let is_of = |format: &Self| start.is_folder == matches!(format.read, Read::Folder(_)) && (format.is_of)(start);
+        FORMATS.iter().copied().find(is_of)
     }
 
     /// Returns whether a path ends in one of its extensions.
@@ -104,6 +154,11 @@ pub(super) fn unknown() -> String {
         Some((last, others)) => format!("neither {} nor {last}", others.join(", ")),
         None => "of no known format".to_owned(),
     }
+}
+
+/// Returns the message about a folder of no known format.
+pub(super) fn unknown_folder() -> String {
+    format!("is a folder, but not of a sequence: {}", sequence::NAMES)
 }
 
 /// Returns whether a file is a checkpoint: a zip archive that has the pickle of a trainer, or that is damaged, so that its error is that of
@@ -143,8 +198,9 @@ mod tests {
 
     #[test]
     fn the_message_about_an_unknown_format_names_every_format() {
-        let expected = "neither a checkpoint of the 4DGS trainer (.pth, a zip archive), a package (.gs4d), a capture of the player splaTV \
-                        (.splatv) nor a SOG (.sog, .sogst, .sog4d, .tsog, or the meta.json or lod-meta.json of one)";
+        let expected = "neither a checkpoint of the 4DGS trainer (.pth, a zip archive), a package (.gs4d), a capture of the player splaTV (.splatv), \
+                        a PLY of Gaussians (.ply), a SOG (.sog, .sogst, .sog4d, .tsog, or the meta.json or lod-meta.json of one), \
+                        a folder of numbered PLY files, an SPZ file (.spz), a glTF file with Gaussians (.glb or .gltf) nor a .splat file (.splat)";
         assert_eq!(unknown(), expected, "every format by name and extension");
     }
 

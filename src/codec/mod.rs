@@ -9,10 +9,11 @@ mod error;
 pub(crate) mod export;
 pub(crate) mod format;
 pub(crate) mod import;
-mod options;
+pub(crate) mod options;
 pub mod package;
 mod start;
 pub(crate) mod text;
+mod zstd_frames;
 
 pub use error::{CodecError, CodecErrorKind};
 pub use import::ImportError;
@@ -30,8 +31,8 @@ use std::fs::File;
 use std::io::{BufReader, Cursor, Read as _, Write};
 use std::path::Path;
 
-/// Reads a capture. Its format follows from the contents of the file, not from its name, unless nothing in the file tells it. The format
-/// interprets the options; see [`ReadOptions`].
+/// Reads a capture: a file, or the folder of a sequence of files. Its format follows from the contents of the file, not from its name, unless
+/// nothing in the file tells it. The format interprets the options; see [`ReadOptions`].
 ///
 /// # Errors
 /// A file that cannot be opened, is of an unknown format, or is damaged; options that are invalid or contradict the
@@ -46,15 +47,17 @@ pub fn load(path: &Path, options: &ReadOptions) -> Result<GaussianScene, CodecEr
 /// As [`load`].
 pub(crate) fn load_stating(path: &Path, options: &ReadOptions) -> Result<Imported, CodecError> {
     let read = || {
-        let (format, mut file) = open(path)?;
-        match format.read {
-            Read::File(read) => Ok(Imported { scene: read(path, file, options)?, lost: Vec::new() }),
-            Read::Bytes(read) => {
+        let (format, file) = open(path)?;
+        match (format.read, file) {
+            (Read::File(read), Some(file)) => Ok(Imported { scene: read(path, file, options)?, lost: Vec::new() }),
+            (Read::Bytes(read), Some(mut file)) => {
                 let mut bytes = Vec::new();
                 file.read_to_end(&mut bytes)?;
                 let folder = path.parent().unwrap_or(Path::new(""));
                 Ok(read(&Source { path, bytes: &bytes, beside: &InFolder(folder) }, options)?)
             }
+            (Read::Folder(read), _) => Ok(read(path, options)?),
+            (Read::File(_) | Read::Bytes(_), None) => Err(CodecErrorKind::UnknownFormat(format::unknown_folder())),
         }
     };
     read().map_err(|kind| CodecError { path: path.to_owned(), kind })
@@ -73,7 +76,7 @@ pub(crate) fn read_bytes(
     let start = Start::of(&mut Cursor::new(bytes), path)?;
     match Format::of(&start).map(|format| format.read) {
         Some(Read::Bytes(read)) => Ok(read(&Source { path, bytes, beside }, options)?),
-        Some(Read::File(_)) | None => Err(CodecErrorKind::UnknownFormat(format::unknown())),
+        Some(Read::File(_) | Read::Folder(_)) | None => Err(CodecErrorKind::UnknownFormat(format::unknown())),
     }
 }
 
@@ -85,17 +88,21 @@ pub(crate) fn read_bytes(
 pub fn inspect(path: &Path) -> Result<(Format, Option<PackageInfo>), CodecError> {
     let inspect = || {
         let (format, file) = open(path)?;
-        Ok((format, format.inspect.map(|inspect| inspect(file)).transpose()?))
+        Ok((format, format.inspect.zip(file).map(|(inspect, file)| inspect(file)).transpose()?))
     };
     inspect().map_err(|kind| CodecError { path: path.to_owned(), kind })
 }
 
-/// Returns the format of a file, and the file at its start.
-fn open(path: &Path) -> Result<(Format, BufReader<File>), CodecErrorKind> {
+/// Returns the format of a file, and the file at its start; of a folder the format alone.
+fn open(path: &Path) -> Result<(Format, Option<BufReader<File>>), CodecErrorKind> {
+    if path.is_dir() {
+        let format = Format::of(&Start::of_folder(path)?);
+        return Ok((format.ok_or_else(|| CodecErrorKind::UnknownFormat(format::unknown_folder()))?, None));
+    }
     let mut file = BufReader::new(File::open(path)?);
     let start = Start::of(&mut file, path)?;
     let format = Format::of(&start).ok_or_else(|| CodecErrorKind::UnknownFormat(format::unknown()))?;
-    Ok((format, file))
+    Ok((format, Some(file)))
 }
 
 /// Writes a scene in the format that the extension of `path` names; as a package if there is no such format or it
@@ -122,7 +129,7 @@ mod tests {
     #[test]
     fn a_file_of_an_unknown_format_is_refused_with_the_known_formats() {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        for (name, text) in [("empty.gs4d", ""), ("short.pth", "PK"), ("points.ply", "ply\nformat ascii 1.0\n")] {
+        for (name, text) in [("empty.gs4d", ""), ("short.pth", "PK"), ("points.obj", "v 0 0 0\n")] {
             let path = folder.path().join(name);
             std::fs::write(&path, text).expect("the folder can be written to");
             let message = load(&path, &ReadOptions::default()).expect_err("not a capture").to_string();

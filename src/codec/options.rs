@@ -8,6 +8,9 @@ use crate::scene::{RotationConvention, TrainedCameras, UpAxis};
 use crate::view::RasterFov;
 use serde::{Deserialize, Serialize};
 
+/// Frames a second of sequences and clips that do not say it.
+pub(crate) const FPS: f32 = 30.0;
+
 /// How a capture was trained and is meant to be played, where the file does not say so or the user decides otherwise.
 ///
 /// A checkpoint contains none of these settings: a field that is `None` is taken from `cfg_args` in the folder of the

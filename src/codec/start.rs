@@ -1,9 +1,10 @@
 //! The start of a file, by which its format is recognized.
 //!
-//! In: a seekable reader and the name of the file. Out: [`Start`]: its first bytes, its extension, and the names of the entries if it is a zip
-//! archive.
+//! In: a seekable reader and the name of the file, or the path of a folder. Out: [`Start`]: its first bytes, its extension, and the names of the
+//! entries if it is a zip archive or a folder.
 
 use std::borrow::Cow;
+use std::fs::DirEntry;
 use std::io::{self, Read, Seek};
 use std::path::Path;
 
@@ -19,8 +20,10 @@ pub(crate) struct Start {
     pub bytes: Vec<u8>,
     /// Its extension in lower case, without the dot.
     pub extension: String,
-    /// The names of the entries of a zip archive; none of other files, and of archives that are damaged.
+    /// The names of the entries of a zip archive or a folder; none of other files, and of archives that are damaged.
     pub entries: Vec<String>,
+    /// Whether it is a folder, which has no bytes.
+    pub is_folder: bool,
 }
 
 impl Start {
@@ -41,7 +44,17 @@ impl Start {
         }
         reader.rewind()?;
         let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
-        Ok(Self { bytes, extension: extension.unwrap_or_default(), entries })
+        Ok(Self { bytes, extension: extension.unwrap_or_default(), entries, is_folder: false })
+    }
+
+    /// Reads the names of the files of a folder.
+    ///
+    /// # Errors
+    /// A folder that cannot be read.
+    pub(crate) fn of_folder(path: &Path) -> io::Result<Self> {
+        let name = |entry: io::Result<DirEntry>| Ok(entry?.file_name().to_string_lossy().into_owned());
+        let entries = path.read_dir()?.map(name).collect::<io::Result<_>>()?;
+        Ok(Self { entries, is_folder: true, ..Self::default() })
     }
 
     /// Returns whether the archive has an entry of this name in its root.

@@ -22,6 +22,7 @@ mod lifespan;
 pub(crate) mod overlap;
 mod parameters;
 pub(crate) mod projection;
+pub(crate) mod rotate_harmonics;
 pub(crate) mod slice;
 
 pub use gradient::GradientMode;

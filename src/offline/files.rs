@@ -49,8 +49,11 @@ impl Files {
         self
     }
 
-    /// Adds a checkpoint or a package, and the `cfg_args` beside it.
+    /// Adds a capture, and the `cfg_args` beside it; of a folder its files.
     pub(crate) fn reads_scene(mut self, path: &Path) -> Self {
+        if let Ok(entries) = path.read_dir() {
+            self.inputs.extend(entries.flatten().map(|entry| entry.path()));
+        }
         self.inputs.extend([path.to_owned(), path.with_file_name("cfg_args")]);
         self
     }

@@ -25,6 +25,7 @@
 //! | `files` | refuses outputs that are inputs or cannot be written, before anything is computed |
 //! | `stages`, `store`, `stored` | run stages and keep their results, from which interrupted work resumes |
 //! | `unfinished` | lists the files and folders that are removed if a process ends before its work |
+//! | `export` | writes files of other makes |
 //! | [`orbit`], `render` | draws a scene from all sides, many pictures at a time |
 
 pub mod ablation;
@@ -37,6 +38,7 @@ pub mod detail;
 pub mod engine;
 mod error;
 pub(crate) mod evaluation;
+pub(crate) mod export;
 pub(crate) mod fidelity;
 pub(crate) mod files;
 pub mod fine_tune;

@@ -175,9 +175,9 @@ fn options_that_no_table_supports_are_experimental() {
 
 #[test]
 fn reports_are_text_without_json() {
-    const VERBS: [&str; 13] = [
-        "info", "convert", "render", "compare", "synth", "bench", "score", "prune", "mask", "eval", "ablate", "bake",
-        "detail",
+    const VERBS: [&str; 14] = [
+        "info", "convert", "export", "render", "compare", "synth", "bench", "score", "prune", "mask", "eval", "ablate",
+        "bake", "detail",
     ];
     let folder = folder();
     let path = scene(&folder, "50");

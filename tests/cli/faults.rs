@@ -45,11 +45,20 @@ struct Verb {
 
 const PACKAGE: &[&str] = &["made.gs4d"];
 
-const VERBS: [Verb; 11] = [
+const VERBS: [Verb; 12] = [
     Verb {
         name: "convert",
         arguments: |from, to| arguments!["convert", from.join("scene.gs4d"), to.join("made.gs4d")].to_vec(),
         files: PACKAGE,
+        needs_gpu: false,
+    },
+    Verb {
+        name: "export",
+        arguments: |from, to| {
+            let time = arguments!["--time", "0.5"];
+            [arguments!["export", from.join("scene.gs4d"), to.join("made.ply")].to_vec(), time.to_vec()].concat()
+        },
+        files: &["made.ply"],
         needs_gpu: false,
     },
     Verb {

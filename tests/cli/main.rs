@@ -10,6 +10,7 @@ mod compress;
 mod dataset;
 mod detail;
 mod eval;
+mod export;
 // Faults need `/dev/full` and the limits of a shell, which Linux has.
 #[cfg(target_os = "linux")]
 mod faults;

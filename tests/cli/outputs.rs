@@ -32,6 +32,8 @@ fn no_verb_writes_over_an_input() {
         arguments!["convert", scene, scene].to_vec(),
         arguments!["convert", scene, data.join("../scene.gs4d")].to_vec(),
         arguments!["convert", scene, &settings].to_vec(),
+        arguments!["export", scene, scene, "--format", "ply", "--time", "0"].to_vec(),
+        arguments!["export", scene, &settings, "--format", "splat", "--time", "0"].to_vec(),
         arguments!["compress", scene, scene].to_vec(),
         arguments!["compress", scene, "--weights", &scores, "-o", &scores].to_vec(),
         arguments!["compress", scene, "--cameras", &cameras, "-o", &cameras].to_vec(),

@@ -9,6 +9,8 @@ mod checkpoint;
 mod checkpoint_poison;
 #[cfg(feature = "offline")]
 mod dataset;
+mod exports;
+mod formats_ply;
 mod golden;
 mod gradients;
 mod grow;
@@ -29,6 +31,7 @@ mod score;
 #[cfg(feature = "offline")]
 mod score_formula;
 mod sog;
+mod spz_and_gltf;
 mod thin;
 
 #[path = "../support"]

@@ -55,7 +55,7 @@ pub(crate) struct CheckpointArgs {
     cutoff: Option<f32>,
     /// Frames a second of a sequence of files [default: 30].
     #[arg(long, value_name = "FPS", value_parser = values::number)]
-    fps: Option<f32>,
+    pub fps: Option<f32>,
     /// Largest distance between a curved path and the straight pieces that replace it, in middle scales of the Gaussian [default: 0.25].
     #[arg(long, value_name = "SCALES", value_parser = values::number)]
     tolerance: Option<f32>,

@@ -6,8 +6,8 @@ use crate::cli::failure::Failure;
 use crate::offline::files::Files;
 use crate::offline::{self, write_settings};
 use crate::scene::GaussianScene;
-use std::fs;
 use std::path::{Path, PathBuf};
+use std::{fs, io};
 
 /// Where to write a package, and how.
 #[derive(clap::Args)]
@@ -65,10 +65,16 @@ impl PackageArgs {
     }
 }
 
-/// Returns the size of a file, bytes.
+/// Returns the size of a file, or of the files of a folder, bytes.
 ///
 /// # Errors
-/// The file cannot be accessed.
+/// The file or the folder cannot be accessed.
 pub(crate) fn file_size(path: &Path) -> Result<u64, Failure> {
-    Ok(fs::metadata(path).map_err(|error| Failure::at(path, &error))?.len())
+    let at = |error| Failure::at(path, &error);
+    let metadata = fs::metadata(path).map_err(at)?;
+    if !metadata.is_dir() {
+        return Ok(metadata.len());
+    }
+    let size = |entry: io::Result<fs::DirEntry>| Ok(entry?.metadata()?.len());
+    fs::read_dir(path).and_then(|entries| entries.map(size).sum()).map_err(at)
 }

@@ -6,7 +6,7 @@ use crate::gaussian::InvalidGaussian;
 
 /// Why a scene was not exported.
 #[derive(Debug, thiserror::Error)]
-pub(crate) enum ExportError {
+pub enum ExportError {
     /// A Gaussian that cannot be drawn.
     #[error(transparent)]
     Gaussian(#[from] InvalidGaussian),

@@ -2,16 +2,23 @@
 //!
 //! In: a [`GaussianScene`](crate::scene::GaussianScene), and for formats without motion a time. Out: the file, and what of the scene it does not
 //! show. `instant` and `moving` turn a scene into [`Columns`](super::import::columns::Columns), each format is one file that writes these,
-//! `table` lists the formats.
+//! `table` lists the formats,
+//! and `exporter` calls all of these.
 
-mod error;
-pub(crate) mod instant;
-pub(crate) mod lost;
-pub(crate) mod moving;
+mod clip;
+pub(crate) mod error;
+pub(crate) mod exporter;
+mod gltf;
+mod instant;
+mod lost;
+mod moving;
 mod ply;
+#[cfg(test)]
+mod samples;
 mod sog;
 mod splat;
+mod spz;
 mod still;
 pub(crate) mod table;
-
-pub(crate) use error::ExportError;
+mod usd;
+mod y_up;

@@ -2,7 +2,7 @@
 //!
 //! In: [`Columns`]. Out: binary little-endian floats, with the properties of the original trainer in its order.
 
-use super::table::Clip;
+use super::clip::Clip;
 use crate::codec::import::columns::{Columns, Motion};
 use std::io::{self, Write};
 

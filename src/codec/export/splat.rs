@@ -2,7 +2,7 @@
 //!
 //! In: [`Columns`]. Out: mean and scales as floats, color and opacity as four bytes, the rotation as four bytes.
 
-use super::table::Clip;
+use super::clip::Clip;
 use crate::codec::import::columns::{Columns, SH_C0};
 use glam::Vec4;
 use std::io::{self, Write};

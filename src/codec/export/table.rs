@@ -3,14 +3,14 @@
 //! In: an id or an extension. Out: an [`Export`], with the function that writes its files. A further format is one new file in this folder and
 //! one row of [`EXPORTS`]; the function gets [`Columns`], so that it knows neither packed records nor harmonics in time.
 
-use super::{ply, sog, splat};
+pub(crate) use super::clip::Clip;
+use super::{gltf, ply, sog, splat, spz, usd};
 use crate::codec::import::columns::Columns;
-use crate::scene::UpAxis;
 use std::io::{self, Write};
 
 /// A format to export to: a row of the table.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Export {
+pub struct Export {
     /// One word for the format, the value of `--format`.
     pub id: &'static str,
     /// Description of a file of this format, with article and extension, for messages.
@@ -18,7 +18,7 @@ pub(crate) struct Export {
     /// Extension of its files, without the first dot: `ply`, `ftgs.ply`.
     pub extension: &'static str,
     /// What a file holds, and the function that writes it.
-    pub what: What,
+    pub(crate) what: What,
     /// What the format cannot hold, whatever the capture: one sentence each.
     pub lost: &'static [&'static str],
 }
@@ -38,27 +38,12 @@ pub(crate) enum What {
 /// Writes the file of a format. Colors have time degree 0, opacities are finite logits, quaternions have any length but 0.
 pub(crate) type Writer = fn(&Columns, &Clip, &mut dyn Write) -> io::Result<()>;
 
-/// How the Gaussians of an export are played.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Clip {
-    /// First and last timestamp; those of the capture also in the file of one instant.
-    pub time_interval: [f32; 2],
-    /// Seconds of one pass through the interval; 0 for a still.
-    pub duration_seconds: f32,
-    /// Frames a second, for formats that count in frames.
-    pub fps: f32,
-    /// The axis of the capture that points up. Writers of formats with an axis of their own rotate the Gaussians, with their colors.
-    pub up: UpAxis,
-    /// The marginal at and below which a Gaussian is not drawn.
-    pub marginal_cutoff: f32,
-}
-
 /// What all formats of the SOG family lose.
 const SOG: &str = "Scales and colors have 256 values, rotations 256 for each component, and at most 65,536 sets of coefficients above degree 0 are \
-                   kept; players take -Y as the axis that points up.";
+                   kept.";
 
 /// All formats.
-pub(crate) const EXPORTS: &[Export] = &[
+pub const EXPORTS: &[Export] = &[
     Export {
         id: "ply",
         name: "a 3DGS PLY (.ply)",
@@ -97,16 +82,45 @@ pub(crate) const EXPORTS: &[Export] = &[
         what: What::Moving(sog::write_sogst),
         lost: &[SOG, "A .sogst file has 256 times and 256 lifespans; paths stay exact. Its players have no cut-off."],
     },
+    Export {
+        id: "spz",
+        name: "an SPZ file, version 3 (.spz)",
+        extension: "spz",
+        what: What::Instant(spz::write),
+        lost: &[
+            "An SPZ file has 256 values for each color channel, the opacity and each scale, which is from e^-10 to e^5.94.",
+            "An SPZ file has 32 values for each coefficient of degree 1 and 16 for each above, from -1 to 1.",
+        ],
+    },
+    Export {
+        id: "gltf",
+        name: "a binary glTF file (.glb)",
+        extension: "glb",
+        what: What::Instant(gltf::write),
+        lost: &[],
+    },
+    Export {
+        id: "usd",
+        name: "an OpenUSD text file (.usda)",
+        extension: "usda",
+        what: What::Windowed(usd::write),
+        lost: &[],
+    },
 ];
 
 impl Export {
     /// Returns the format with this id.
-    pub(crate) fn of_id(id: &str) -> Option<&'static Self> {
+    pub fn of_id(id: &str) -> Option<&'static Self> {
         EXPORTS.iter().find(|export| export.id == id)
     }
 
+    /// Returns whether its files have motion.
+    pub fn is_moving(&self) -> bool {
+        !matches!(self.what, What::Instant(_))
+    }
+
     /// Returns the format of a file name: that with the longest extension that the name ends in.
-    pub(crate) fn of_name(name: &str) -> Option<&'static Self> {
+    pub fn of_name(name: &str) -> Option<&'static Self> {
         let name = name.to_lowercase();
         let ends_so = |export: &&Self| {
             name.strip_suffix(export.extension).is_some_and(|stem| stem.len() > 1 && stem.ends_with('.'))

@@ -57,6 +57,39 @@ impl Played {
     pub(crate) fn still(up: UpAxis) -> Self {
         Self { up, time_interval: [0.0, 1.0], duration_seconds: 0.0, marginal_cutoff: SMALLEST_CUTOFF }
     }
+
+    /// Returns the scene of Gaussians that are played so; the options replace values.
+    ///
+    /// # Errors
+    /// Parts that do not fit together.
+    pub(crate) fn scene(
+        self,
+        form: SceneForm,
+        filter: Option<TemporalFilter>,
+        options: &ReadOptions,
+    ) -> Result<GaussianScene, ImportError> {
+        let scene = GaussianScene {
+            form,
+            environment: None,
+            filter,
+            trained_with: TrainedWith {
+                time_interval: options.time_interval.unwrap_or(self.time_interval),
+                background: options.background.unwrap_or_default(),
+                marginal_cutoff: options.marginal_cutoff.unwrap_or(self.marginal_cutoff),
+                raster_fov: options.raster_fov.unwrap_or_default(),
+                cameras: options.cameras.unwrap_or_default(),
+                sh_direction: options.sh_direction.unwrap_or_default(),
+                ..TrainedWith::default()
+            },
+            playback: PlaybackHints {
+                up: options.up.unwrap_or(self.up),
+                duration_seconds: options.duration_seconds.unwrap_or(self.duration_seconds),
+            },
+            levels: Vec::new(),
+        };
+        scene.check().map_err(ImportError::damaged)?;
+        Ok(scene)
+    }
 }
 
 impl Columns {
@@ -112,27 +145,7 @@ impl Columns {
         } else {
             SceneForm::Trained(Trained { parameters, harmonics })
         };
-        let scene = GaussianScene {
-            form,
-            environment: None,
-            filter,
-            trained_with: TrainedWith {
-                time_interval: options.time_interval.unwrap_or(played.time_interval),
-                background: options.background.unwrap_or_default(),
-                marginal_cutoff: options.marginal_cutoff.unwrap_or(played.marginal_cutoff),
-                raster_fov: options.raster_fov.unwrap_or_default(),
-                cameras: options.cameras.unwrap_or_default(),
-                sh_direction: options.sh_direction.unwrap_or_default(),
-                ..TrainedWith::default()
-            },
-            playback: PlaybackHints {
-                up: options.up.unwrap_or(played.up),
-                duration_seconds: options.duration_seconds.unwrap_or(played.duration_seconds),
-            },
-            levels: Vec::new(),
-        };
-        scene.check().map_err(ImportError::damaged)?;
-        Ok(scene)
+        played.scene(form, filter, options)
     }
 }
 

@@ -5,12 +5,19 @@
 
 pub(crate) mod columns;
 mod cubic;
+pub(crate) mod drawable;
 mod error;
+pub(crate) mod gltf;
 mod imported;
 mod in_pieces;
+pub(crate) mod placed;
+pub(crate) mod ply;
+pub(crate) mod sequence;
 pub(crate) mod sog;
 pub(crate) mod source;
+pub(crate) mod splat;
 pub(crate) mod splatv;
+pub(crate) mod spz;
 
 pub use error::ImportError;
 pub(crate) use imported::Imported;

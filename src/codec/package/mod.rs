@@ -152,11 +152,11 @@ fn read_sections(
     let mut scene = layout::blank(header);
     // Values are written at positions from the header: the tables must have the sizes of the header.
     header.check_scene(&scene)?;
-    let (mut body, mut planes) = (Vec::new(), Vec::new());
+    let mut body = Vec::new();
     for section in &header.sections {
         section.read_body(reader, &mut body)?;
         if let Some(attribute) = attributes.iter().find(|a| a.name == section.name) {
-            section.decode(&body, attribute, &mut planes, layout::words_mut(&mut scene, attribute.name))?;
+            section.decode(&body, attribute, layout::words_mut(&mut scene, attribute.name))?;
         } else if section.name == LEVEL {
             level(&body)?;
         }

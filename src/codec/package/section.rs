@@ -5,6 +5,7 @@
 use super::attribute::Attribute;
 use super::error::PackageError;
 use super::planes;
+use crate::codec::zstd_frames;
 use serde::{Deserialize, Serialize};
 use std::io::{Read, Write};
 use std::ops::Range;
@@ -96,24 +97,14 @@ impl Section {
         Ok(())
     }
 
-    /// Decompresses a body into the table `words`; `planes` is a scratch buffer. The section must have been checked
-    /// against the attribute.
-    pub(super) fn decode(
-        &self,
-        body: &[u8],
-        attribute: &Attribute,
-        planes: &mut Vec<u8>,
-        words: &mut [u32],
-    ) -> Result<(), PackageError> {
+    /// Decompresses a body into the table `words`. The section must have been checked against the attribute.
+    pub(super) fn decode(&self, body: &[u8], attribute: &Attribute, words: &mut [u32]) -> Result<(), PackageError> {
         let damaged = |reason| PackageError::SectionBody { name: self.name.clone(), reason };
-        planes.clear();
-        planes.resize(self.raw_length, 0);
-        // Never writes past the end of the buffer: a frame that holds more is refused.
-        let length = zstd::bulk::decompress_to_buffer(body, planes).map_err(|e| damaged(e.to_string()))?;
-        if length != self.raw_length {
-            return Err(damaged(format!("it holds {length} bytes instead of {}", self.raw_length)));
+        let planes = zstd_frames::decompress(body, self.raw_length).map_err(|e| damaged(e.to_string()))?;
+        if planes.len() != self.raw_length {
+            return Err(damaged(format!("it holds {} bytes instead of {}", planes.len(), self.raw_length)));
         }
-        planes::join(planes, attribute, self.first..self.first + self.count, words);
+        planes::join(&planes, attribute, self.first..self.first + self.count, words);
         Ok(())
     }
 }

@@ -3,7 +3,8 @@
 //! In: Gaussians made here. Out: proof that the scene of their file has them, within the steps of the codes; the file, for other tests.
 
 use super::archive::Entry;
-use crate::codec::export::table::{Clip, Export, What};
+use crate::codec::export::clip::Clip;
+use crate::codec::export::table::{Export, What};
 use crate::codec::import::columns::{Columns, Motion, logit};
 use crate::codec::import::source::{InMemory, Source};
 use crate::codec::import::{Imported, sog};

@@ -1,0 +1,103 @@
+//! A PLY file of any layout.
+//!
+//! In: the bytes of a file. Out: its scene; or, for frames of a sequence, its Gaussians at rest.
+
+use super::body::tables;
+use super::header::{Comments, Header};
+use super::layout::Layout;
+use super::table::Table;
+use super::{compressed, moving, rotated, splats};
+use crate::codec::import::columns::{Columns, Played};
+use crate::codec::import::drawable::keep_drawable;
+use crate::codec::import::error::ImportError;
+use crate::codec::import::imported::Imported;
+use crate::codec::import::source::Source;
+use crate::codec::options::ReadOptions;
+use crate::gaussian::MARGINAL_CUTOFF;
+use crate::scene::{RotationConvention, SceneForm, UpAxis};
+
+/// Reads a file.
+///
+/// # Errors
+/// A file that is damaged or holds no Gaussians, or Gaussians of a kind that has no equivalent here; invalid options.
+pub(crate) fn read(source: &Source<'_>, options: &ReadOptions) -> Result<Imported, ImportError> {
+    options.check()?;
+    let header = Header::read(source.bytes)?;
+    let tables = tables(&header, source.bytes)?;
+    let layout = Layout::of(&tables)?;
+    let vertex = vertex(&tables)?;
+    if layout == Layout::Rotated {
+        return native(vertex, options);
+    }
+    let (comments, mut lost) = (&header.comments, Vec::new());
+    let mut columns = at_rest(layout, &tables, comments, &mut lost)?;
+    let (motion, played) = match layout {
+        Layout::FreeTime => moving::free_time(vertex, comments, options, &mut lost)?,
+        Layout::Sogst => moving::sogst(vertex, comments, options, &mut lost)?,
+        Layout::Sog4d => moving::sog4d(vertex, comments)?,
+        Layout::Splats | Layout::Compressed | Layout::Rotated => (Vec::new(), Played::still(UpAxis::NegY)),
+        Layout::SogstCurved | Layout::Spacetime => return Err(curved(layout)),
+    };
+    columns.motion = motion;
+    lost.extend(keep_drawable(&mut columns));
+    Ok(Imported { scene: columns.into_scene(played, options)?, lost })
+}
+
+/// Reads the Gaussians of a file that are all at rest.
+///
+/// # Errors
+/// As [`read`]; a file of moving Gaussians.
+pub(crate) fn still(bytes: &[u8], lost: &mut Vec<String>) -> Result<Columns, ImportError> {
+    let header = Header::read(bytes)?;
+    let tables = tables(&header, bytes)?;
+    let layout = Layout::of(&tables)?;
+    if !matches!(layout, Layout::Splats | Layout::Compressed) {
+        return Err(ImportError::unsupported(
+            "holds moving Gaussians, which cannot be a frame of a sequence: open it by itself",
+        ));
+    }
+    let mut columns = at_rest(layout, &tables, &header.comments, lost)?;
+    lost.extend(keep_drawable(&mut columns));
+    Ok(columns)
+}
+
+fn vertex<'a, 'b>(tables: &'b [Table<'a>]) -> Result<&'b Table<'a>, ImportError> {
+    tables.iter().find(|table| table.name == "vertex").ok_or_else(|| ImportError::damaged("has no element vertex"))
+}
+
+/// Reads the attributes that Gaussians at rest have too.
+fn at_rest(
+    layout: Layout,
+    tables: &[Table<'_>],
+    comments: &Comments,
+    lost: &mut Vec<String>,
+) -> Result<Columns, ImportError> {
+    let vertex = vertex(tables)?;
+    match layout {
+        Layout::Compressed => compressed::columns(tables, vertex),
+        _ => splats::columns(vertex, comments, lost),
+    }
+}
+
+/// Reads native 4D Gaussians into the trained form.
+fn native(vertex: &Table<'_>, options: &ReadOptions) -> Result<Imported, ImportError> {
+    let mut trained = rotated::trained(vertex)?;
+    let convention = options.rotation_convention.unwrap_or_default();
+    if convention == RotationConvention::Unflipped {
+        trained.parameters.flip_rotations();
+    }
+    let played = Played { duration_seconds: 1.0, marginal_cutoff: MARGINAL_CUTOFF, ..Played::still(UpAxis::PosZ) };
+    let mut scene = played.scene(SceneForm::Trained(trained), None, options)?;
+    scene.trained_with.rotation_convention = convention;
+    Ok(Imported { scene, lost: Vec::new() })
+}
+
+/// Returns the error about paths that are not straight.
+fn curved(layout: Layout) -> ImportError {
+    let what = if layout == Layout::Spacetime {
+        "Spacetime Gaussians, on cubic paths"
+    } else {
+        "Gaussians with an acceleration"
+    };
+    ImportError::unsupported(format!("holds {what}, which are not read from PLY"))
+}

@@ -1,0 +1,316 @@
+//! Tests of PLY files that the tests make.
+
+use super::fixture::{File, read_bytes, refusal};
+use crate::codec::import::Imported;
+use crate::codec::import::columns::{SH_C0, logit};
+use crate::codec::options::ReadOptions;
+use crate::gaussian::{Gaussian, Harmonics, Model, Parameters, SMALLEST_CUTOFF};
+use crate::scene::{Form, RotationConvention, SceneForm, Trained, UpAxis};
+
+fn read(bytes: &[u8]) -> Imported {
+    read_bytes(bytes, &ReadOptions::default()).unwrap_or_else(|error| panic!("the file can be read: {error}"))
+}
+
+fn trained(imported: Imported) -> (Parameters, Harmonics) {
+    match imported.scene.form {
+        SceneForm::Trained(Trained { parameters, harmonics }) => (parameters, harmonics),
+        SceneForm::Ready(_) => panic!("Gaussians at rest have the trained form"),
+    }
+}
+
+fn sliced(imported: Imported) -> (Vec<Gaussian>, Harmonics) {
+    match imported.scene.form {
+        SceneForm::Ready(Form::Sliced(sliced)) => (sliced.gaussians, sliced.harmonics),
+        _ => panic!("moving Gaussians have the sliced form"),
+    }
+}
+
+#[test]
+fn values_of_3dgs_stay_as_they_are() {
+    for (rest, degree) in [(0, 0), (9, 1), (24, 2), (45, 3)] {
+        let file = File::splats(5, rest);
+        let imported = read(&file.little());
+        assert_eq!(imported.lost, [""; 0], "nothing is lost at degree {degree}");
+        let (trained_with, playback) = (&imported.scene.trained_with, imported.scene.playback);
+        assert_eq!((playback.up, playback.duration_seconds), (UpAxis::NegY, 0.0), "a still with -y up");
+        assert_eq!(trained_with.marginal_cutoff, SMALLEST_CUTOFF, "no cut-off");
+        let (parameters, harmonics) = trained(imported);
+        assert_eq!(parameters.model(), Model::Static3d, "Gaussians at rest");
+        assert_eq!((harmonics.degree, harmonics.degree_t), (degree, 0), "the degree of {rest} coefficients");
+        for row in 0..5 {
+            let value = |name: &str| file.value(name, row);
+            assert_eq!(parameters.mean[row], ["x", "y", "z"].map(value), "mean {row}");
+            assert_eq!(parameters.log_scale[row], ["scale_0", "scale_1", "scale_2"].map(value), "scales {row}");
+            assert_eq!(parameters.rotation_l[row], ["rot_0", "rot_1", "rot_2", "rot_3"].map(value), "rotation {row}");
+            assert_eq!(parameters.opacity_logit[row], value("opacity"), "opacity {row}");
+            let colors = harmonics.of(row);
+            assert_eq!(colors[..3], ["f_dc_0", "f_dc_1", "f_dc_2"].map(value), "first coefficient {row}");
+            for (k, rgb) in colors[3..].chunks_exact(3).enumerate() {
+                let names = [0, 1, 2].map(|channel| format!("f_rest_{}", channel * rest / 3 + k));
+                assert_eq!(rgb, names.map(|name| value(&name)), "coefficient {} of {row}", k + 1);
+            }
+        }
+    }
+}
+
+#[test]
+fn encodings_types_and_orders_give_the_same_scene() {
+    let file = File::splats(7, 9);
+    let expected = read(&file.little());
+    assert_eq!(read(&file.big()), expected, "big-endian");
+    assert_eq!(read(&file.ascii()), expected, "ASCII");
+    assert_eq!(read(&file.doubles()), expected, "doubles");
+    let lines = String::from_utf8(file.ascii()).expect("text").replace('\n', "\r\n");
+    assert_eq!(read(lines.as_bytes()), expected, "lines that end as on Windows");
+    let mut shuffled = file.with("red", |row| row as f32);
+    shuffled.names.reverse();
+    shuffled.rows.iter_mut().for_each(|row| row.reverse());
+    assert_eq!(read(&shuffled.little()), expected, "another order, with another property");
+}
+
+#[test]
+fn other_elements_are_skipped() {
+    let file = File::splats(3, 0);
+    let (expected, little, ascii) = (read(&file.little()), file.little(), file.ascii());
+    let face = "element face 2\nproperty uchar kind\nproperty list uchar int vertex_indices\nelement vertex";
+    let with = |bytes: &[u8], faces: &[u8]| {
+        let end = bytes.windows(11).position(|window| window == b"end_header\n").expect("a header") + 11;
+        let header = String::from_utf8(bytes[..end].to_owned()).expect("text").replacen("element vertex", face, 1);
+        [header.as_bytes(), faces, &bytes[end..]].concat()
+    };
+    let faces = [&[9u8, 3][..], &[1u8; 12], &[9, 0]].concat();
+    assert_eq!(read(&with(&little, &faces)), expected, "binary lists before the vertices");
+    assert_eq!(read(&with(&ascii, b"9 3 0 1 2\n9 0\n")), expected, "lists of numbers before the vertices");
+}
+
+#[test]
+fn a_file_that_is_cut_anywhere_is_refused() {
+    let moving = File::splats(2, 0).with("t_center", |_| 0.5).with("t_sigma", |_| 0.1).with("vx", |_| 1.0);
+    let moving = moving.with("vy", |_| 0.0).with("vz", |_| 0.0).comment("sogst.time_min 0").comment("sogst.time_max 1");
+    for file in [File::splats(3, 9).little(), compressed(3), moving.little()] {
+        read(&file);
+        for length in 0..file.len() {
+            let message = refusal(&file[..length]);
+            assert!(!message.is_empty(), "cut after {length} bytes");
+        }
+    }
+    let ascii = File::splats(2, 0).ascii();
+    // The last digits of the last number may be missing without a trace.
+    let numbers = ascii.trim_ascii_end().iter().rposition(|&byte| byte == b' ').expect("more than one number");
+    (0..=numbers).for_each(|length| assert!(!refusal(&ascii[..length]).is_empty(), "cut after {length} bytes"));
+}
+
+#[test]
+fn damaged_headers_are_refused_with_the_line() {
+    let text = String::from_utf8(File::splats(1, 0).ascii()).expect("text");
+    for (from, to, reason) in [
+        ("format ascii 1.0\n", "", "no line \"format\""),
+        ("format ascii", "format binary_middle_endian", "binary_middle_endian"),
+        ("property float x", "property half x", "property half x"),
+        ("element vertex 1", "element vertex many", "element vertex many"),
+        ("element vertex 1\n", "", "property float x"),
+        ("element vertex 1", "element vertex 18446744073709551615", "the file is cut"),
+        ("element vertex 1", "element vertex 99999999999999999999", "element vertex 9"),
+        ("property float x\n", "property float x\nsurprise\n", "surprise"),
+        ("property float scale_1\n", "property list uchar float scale_1\n", "place of a number"),
+        ("property float x\n", "", "no property x"),
+    ] {
+        assert!(text.contains(from), "the file has {from}");
+        let message = refusal(text.replacen(from, to, 1).as_bytes());
+        assert!(message.contains(reason), "{to:?} in place of {from:?}: {message}");
+    }
+    let huge = "ply\nformat binary_little_endian 1.0\nelement vertex 4000000000000\nproperty float x\nend_header\n";
+    assert!(refusal(huge.as_bytes()).contains("cut"), "a number of rows that the file does not have");
+}
+
+#[test]
+fn other_files_are_refused_with_the_way_out() {
+    let without = |names: &[&str]| {
+        let mut file = File::splats(1, 0);
+        for name in names {
+            let column = file.names.iter().position(|found| found == name).expect("the property is there");
+            file.names.remove(column);
+            file.rows[0].remove(column);
+        }
+        file
+    };
+    let cloud = without(&["opacity"]);
+    assert!(refusal(&cloud.little()).contains("a point cloud or a mesh"), "a file without opacities");
+    let surfels = without(&["scale_2"]);
+    assert!(refusal(&surfels.little()).contains("surfels (2DGS"), "a file with two scales");
+    let full = File::splats(1, 0).with("motion_0", |_| 0.0).with("f_t_0", |_| 0.0);
+    assert!(refusal(&full.little()).contains("\"lite\""), "Spacetime Gaussians with a network");
+    let text = String::from_utf8(File::splats(1, 0).ascii()).expect("text").replace("element vertex", "element point");
+    assert!(refusal(text.as_bytes()).contains("without vertices"), "no vertices");
+    let odd = File::splats(1, 10);
+    assert!(refusal(&odd.little()).contains("10 properties f_rest"), "no degree of color");
+    let degree_4 = read(&File::splats(1, 72).little());
+    assert!(degree_4.lost[0].contains("degree 4"), "a higher degree is cut: {:?}", degree_4.lost);
+    assert_eq!(trained(degree_4).1.degree, 3, "degree 3 is left");
+}
+
+#[test]
+fn the_filter_of_mip_splatting_is_fused() {
+    let file =
+        File::splats(4, 0).with("filter_3D", |_| 0.3).comment("SplatRenderMode: default").comment("antialiased 1");
+    let imported = read(&file.little());
+    assert!(imported.lost[0].contains("anti-aliasing"), "the filter of pixels is lost: {:?}", imported.lost);
+    let (parameters, _) = trained(imported);
+    for row in 0..4 {
+        let scale = [0, 1, 2].map(|axis| file.value(&format!("scale_{axis}"), row).exp());
+        let wider = scale.map(|scale| scale.hypot(0.3));
+        let factor = scale.iter().product::<f32>() / wider.iter().product::<f32>();
+        let opacity = 1.0 / (1.0 + (-file.value("opacity", row)).exp());
+        for (axis, wider) in wider.into_iter().enumerate() {
+            assert!((parameters.log_scale[row][axis] - wider.ln()).abs() < 1e-5, "scale {axis} of {row} is wider");
+        }
+        let found = 1.0 / (1.0 + (-parameters.opacity_logit[row]).exp());
+        assert!((found - opacity * factor).abs() < 1e-5, "the opacity of {row} is {opacity} times {factor}");
+    }
+    for (comments, is_lost) in
+        [(["antialiased 1", "SplatRenderMode: default"], false), (["x", "SplatRenderMode: mip"], true)]
+    {
+        let file = File { comments: comments.map(str::to_owned).into(), ..File::splats(1, 0) };
+        assert_eq!(read(&file.little()).lost.len(), usize::from(is_lost), "the last of {comments:?} decides");
+    }
+}
+
+fn free_time() -> File {
+    let file = File::splats(3, 9).with("time", |row| row as f32 * 0.4).with("log_duration", |row| row as f32 - 5.0);
+    let file = file.with("velocity_0", |_| 1.0).with("velocity_1", |_| 2.0).with("velocity_2", |row| row as f32);
+    file.comment("ftgs_version 1").comment("time_units normalized").comment("min_duration 0.02").comment("n_frames 60")
+}
+
+#[test]
+fn free_time_gaussians_move_and_fade() {
+    let imported = read(&free_time().comment("opacity_floor 1e-4").little());
+    assert!(imported.lost[0].contains("0.0001"), "the floor of the opacity is stated: {:?}", imported.lost);
+    assert_eq!(imported.scene.trained_with.time_interval, [0.0, 1.0], "normalized times");
+    assert_eq!(imported.scene.playback.duration_seconds, 2.0, "60 frames at 30 a second");
+    let (gaussians, _) = sliced(imported);
+    for (row, gaussian) in gaussians.iter().enumerate() {
+        assert_eq!(gaussian.mean_t, row as f32 * 0.4, "the time of {row}");
+        assert_eq!(gaussian.sigma_t, (row as f32 - 5.0).exp().max(0.02), "the lifespan of {row}");
+        assert_eq!(gaussian.velocity, [1.0, 2.0, row as f32], "the velocity of {row}");
+    }
+    let faster = ReadOptions { fps: Some(15.0), ..ReadOptions::default() };
+    let imported = read_bytes(&free_time().little(), &faster).expect("it can be read");
+    assert_eq!(imported.scene.playback.duration_seconds, 4.0, "60 frames at 15 a second");
+    let resting = read(&free_time().comment("use_velocity false").little());
+    assert_eq!(sliced(resting).0[2].velocity, [0.0; 3], "velocities are not used");
+    assert!(refusal(&free_time().comment("ftgs_version 2").little()).contains("version 2"), "another version");
+    assert!(refusal(&free_time().comment("n_frames many").little()).contains("n_frames"), "a comment without a number");
+}
+
+#[test]
+fn the_envelope_of_sog4d_is_narrower_by_the_root_of_two() {
+    let mut file = File::splats(2, 0).with("trbf_center", |_| 1.5).with("trbf_scale", |_| -1.0);
+    for axis in 0..3 {
+        file = file.with(&format!("motion_{axis}"), |_| axis as f32);
+    }
+    let imported = read(&file.clone().comment("cfg_args: start=1 duration=2 fps=30.0 sh_degree=0").little());
+    assert_eq!(imported.scene.trained_with.time_interval, [1.0, 3.0], "the interval of cfg_args");
+    assert_eq!(imported.scene.playback.duration_seconds, 2.0, "in seconds");
+    let gaussian = sliced(imported).0[1];
+    assert_eq!((gaussian.mean_t, gaussian.velocity), (1.5, [0.0, 1.0, 2.0]), "time and velocity");
+    assert!((gaussian.marginal(2.0) - (-(0.5f32 / (-1.0f32).exp()).powi(2)).exp()).abs() < 1e-6, "exp(-(dt/s)^2)");
+    let bad = file.clone().comment("cfg_args: start=1 duration=-2");
+    assert!(refusal(&bad.little()).contains("duration"), "a clip that ends before it begins");
+    let curved = (3..9).fold(file, |file, axis| file.with(&format!("motion_{axis}"), |_| 0.0));
+    assert!(!refusal(&curved.little()).is_empty(), "cubic paths are another layout");
+}
+
+#[test]
+fn a_sogst_ply_needs_the_times_of_its_clip() {
+    let mut file = File::splats(2, 0).with("t_center", |_| 0.5).with("t_sigma", |_| 0.1);
+    for (name, velocity) in [("vx", 1.0), ("vy", 2.0), ("vz", 3.0)] {
+        file = file.with(name, move |_| velocity);
+    }
+    assert!(refusal(&file.little()).contains("sogst.time_min"), "no times");
+    let given = ReadOptions { time_interval: Some([0.0, 4.0]), ..ReadOptions::default() };
+    let imported = read_bytes(&file.little(), &given).expect("the times are given");
+    assert_eq!(imported.scene.trained_with.time_interval, [0.0, 4.0], "the times that are given");
+    let imported = read(&file.comment("sogst.time_min 0.5").comment("sogst.time_max 2").little());
+    assert_eq!(imported.scene.trained_with.time_interval, [0.5, 2.0], "the times of the comments");
+    let gaussian = sliced(imported).0[0];
+    assert_eq!((gaussian.velocity, gaussian.sigma_t), ([1.0, 2.0, 3.0], 0.1), "velocity and lifespan");
+}
+
+#[test]
+fn gaussians_of_ply4d_are_those_of_the_trainer() {
+    let mut names: Vec<String> = ["x", "y", "z", "t", "sx", "sy", "sz", "st", "opacity"].map(str::to_owned).into();
+    for stem in ["rot", "rot_r"] {
+        names.extend(["x", "y", "z", "w"].map(|axis| format!("{stem}_{axis}")));
+    }
+    names.extend((0..48).flat_map(|k| ["r", "g", "b"].map(|channel| format!("feat_{channel}_{k}"))));
+    let rows = vec![(0..names.len()).map(|column| (column as f32 + 1.0) / 200.0).collect()];
+    let file = File { comments: Vec::new(), names, rows };
+    let imported = read(&file.little());
+    assert_eq!(imported.scene.trained_with.marginal_cutoff, 0.05, "the cut-off of the trainer");
+    let (parameters, harmonics) = trained(imported);
+    assert_eq!(parameters.model(), Model::Rotated4d, "native 4D Gaussians");
+    assert_eq!(parameters.log_scale[0][1], (6.0f32 / 200.0).ln(), "scales are logarithms");
+    assert_eq!(parameters.log_scale_t[0], (8.0f32 / 200.0).ln(), "the temporal scale too");
+    assert_eq!(parameters.opacity_logit[0], logit(9.0 / 200.0), "the opacity is a logit");
+    assert_eq!(parameters.rotation_l[0], [10.0, 11.0, 12.0, 13.0].map(|v| v / 200.0), "x is the first component");
+    assert_eq!(parameters.rotation_r[0], [14.0, 15.0, 16.0, 17.0].map(|v| v / 200.0), "of the right rotation too");
+    assert_eq!((harmonics.degree, harmonics.degree_t), (3, 2), "48 coefficients");
+    assert_eq!(harmonics.of(0)[4], file.value("feat_g_1", 0), "coefficients with RGB innermost");
+    let unflipped = ReadOptions { rotation_convention: Some(RotationConvention::Unflipped), ..ReadOptions::default() };
+    let flipped = trained(read_bytes(&file.little(), &unflipped).expect("it can be read")).0;
+    assert_eq!(flipped.rotation_l[0][1], -11.0 / 200.0, "rotations of the other convention are flipped");
+}
+
+/// Returns a compressed file of Gaussians in one chunk, at the corners of its box, with colors of degree 1.
+fn compressed(count: usize) -> Vec<u8> {
+    let names =
+        ["min", "max"].map(|end| ["x", "y", "z", "scale_x", "scale_y", "scale_z"].map(|axis| format!("{end}_{axis}")));
+    let [low, high] = names.map(|names| names.map(|name| format!("property float {name}\n")));
+    let packed = ["position", "rotation", "scale", "color"].map(|name| format!("property uint packed_{name}\n"));
+    let sh: String = (0..9).map(|i| format!("property uchar f_rest_{i}\n")).collect();
+    let header = format!(
+        "ply\nformat binary_little_endian 1.0\nelement chunk 1\n{}{}element vertex {count}\n{}element sh {count}\n{sh}end_header\n",
+        low.concat(),
+        high.concat(),
+        packed.concat()
+    );
+    let mut bytes = header.into_bytes();
+    for value in [-1.0f32, -2.0, -3.0, -4.0, -5.0, -6.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0] {
+        bytes.extend(value.to_le_bytes());
+    }
+    for row in 0..count {
+        let corner = if row % 2 == 0 { 0 } else { u32::MAX };
+        // The first component is the largest; the others are 0, up to half a step.
+        for word in [corner, 512 | 512 << 10 | 512 << 20, corner, 0xff00_80ff] {
+            bytes.extend(u32::to_le_bytes(word));
+        }
+    }
+    bytes.extend((0..count * 9).map(|i| [0, 255, 128][i % 3]));
+    bytes
+}
+
+#[test]
+fn compressed_gaussians_lie_in_the_boxes_of_their_chunks() {
+    let (parameters, harmonics) = trained(read(&compressed(2)));
+    assert_eq!(parameters.mean, [[-1.0, -2.0, -3.0], [1.0, 2.0, 3.0]], "the corners of the box");
+    assert_eq!(parameters.log_scale, [[-4.0, -5.0, -6.0], [4.0, 5.0, 6.0]], "the smallest and the largest scales");
+    assert!(parameters.rotation_l[0][0] > 0.999, "the component that is left out: {:?}", parameters.rotation_l[0]);
+    assert_eq!(parameters.opacity_logit[0], logit(1.0), "the opacity");
+    let colors = harmonics.of(1);
+    assert_eq!(colors[..2], [0.5 / SH_C0, -0.5 / SH_C0], "red and green");
+    assert_eq!(colors[3..6], [-4.0, -4.0, -4.0], "the first coefficient of each channel");
+    assert_eq!(colors[6..9], [4.0, 4.0, 4.0], "the second");
+    assert_eq!(colors[9], (128.5 / 256.0 - 0.5) * 8.0, "the third, in the middle of its step");
+    let other = String::from_utf8_lossy(&compressed(0)).replace("element chunk 1", "element chunk 2");
+    assert!(refusal(other.as_bytes()).contains("chunk"), "chunks of another number of Gaussians");
+}
+
+#[test]
+fn gaussians_that_are_not_finite_are_left_out() {
+    let mut file = File::splats(3, 0);
+    file.rows[1][0] = f32::NAN;
+    let imported = read(&file.little());
+    assert!(imported.lost[0].starts_with("1 of 3"), "they are counted: {:?}", imported.lost);
+    assert_eq!(imported.scene.len(), 2, "the others are kept");
+    assert_eq!(read(&File::splats(0, 0).little()).scene.len(), 0, "a file without Gaussians");
+}

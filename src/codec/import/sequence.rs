@@ -1,0 +1,263 @@
+//! A sequence: one file of Gaussians at rest for each frame.
+//!
+//! In: the frames in order, or a folder of numbered PLY files. Out: one scene, in which a temporal filter shows the Gaussians of one frame at a time.
+//! Every frame is exact; nothing is interpolated.
+
+use super::columns::{Columns, Played};
+use super::error::ImportError;
+use super::imported::Imported;
+use super::ply;
+use crate::codec::options::{FPS, InvalidOption, ReadOptions};
+use crate::gaussian::{Harmonics, SMALLEST_CUTOFF};
+use crate::scene::{ActiveSets, FilterKind, MAX_SEGMENTS, TemporalFilter, UpAxis};
+use std::io;
+use std::path::Path;
+
+/// The names of the files of a sequence, for messages.
+pub(crate) const NAMES: &str = "two or more files with the same beginning and a number before .ply or .compressed.ply (frame_0001.ply, frame_0002.ply)";
+
+/// A frame: the name of its file, and a function that returns its bytes.
+pub(crate) struct Frame<'a> {
+    /// Name, for messages.
+    pub name: String,
+    /// Returns the bytes. It is called once, when all earlier frames are read.
+    pub bytes: Box<dyn FnOnce() -> io::Result<Vec<u8>> + 'a>,
+}
+
+/// Returns whether files of these names are a sequence.
+pub(crate) fn is_sequence(names: &[String]) -> bool {
+    names.iter().filter(|name| number(name).is_some()).nth(1).is_some()
+}
+
+/// Reads the numbered PLY files of a folder as a sequence.
+///
+/// # Errors
+/// A folder without such files, or with files of two sequences; as [`read`].
+pub(crate) fn read_folder(folder: &Path, options: &ReadOptions) -> Result<Imported, ImportError> {
+    let entries = folder.read_dir()?.collect::<io::Result<Vec<_>>>()?;
+    let names = ordered(entries.iter().map(|entry| entry.file_name().to_string_lossy().into_owned()).collect())?;
+    let frames = names.into_iter().map(|name| {
+        let path = folder.join(&name);
+        Frame { name, bytes: Box::new(move || std::fs::read(path)) }
+    });
+    read(frames, options)
+}
+
+/// Reads frames of equal length, each of which is a PLY file of Gaussians at rest.
+///
+/// # Errors
+/// A frame that cannot be read, by name; more than 65 535 frames, none, invalid options.
+pub(crate) fn read<'a>(
+    frames: impl ExactSizeIterator<Item = Frame<'a>>,
+    options: &ReadOptions,
+) -> Result<Imported, ImportError> {
+    options.check()?;
+    let count =
+        u32::try_from(frames.len()).ok().filter(|count| (1..=MAX_SEGMENTS).contains(count)).ok_or_else(|| {
+            ImportError::unsupported(format!("has {} frames; 1 to {MAX_SEGMENTS} can be read", frames.len()))
+        })?;
+    let duration_seconds = count as f32 / options.fps.unwrap_or(FPS);
+    if !duration_seconds.is_normal() {
+        let reason = format!("{count} frames last {duration_seconds} seconds");
+        return Err(InvalidOption { name: "fps", reason }.into());
+    }
+    let (mut all, mut intervals, mut losses) = (Columns::with_capacity(0, 0), Vec::new(), Losses::default());
+    for (number, frame) in (0..count).zip(frames) {
+        let at = |error: ImportError| at(&frame.name, error);
+        let bytes = (frame.bytes)().map_err(|error| at(error.into()))?;
+        let mut lost = Vec::new();
+        let columns = ply::still(&bytes, &mut lost).map_err(at)?;
+        losses.add(&frame.name, lost);
+        intervals.resize(intervals.len() + columns.len(), number | number << 16);
+        append(&mut all, columns);
+    }
+    let sets = ActiveSets::Intervals(intervals);
+    all.filter = Some(TemporalFilter { kind: FilterKind::Interval, segments: count, count: all.len(), sets });
+    let time_interval = [0.0, duration_seconds];
+    let played = Played { up: UpAxis::NegY, time_interval, duration_seconds, marginal_cutoff: SMALLEST_CUTOFF };
+    Ok(Imported { scene: all.into_scene(played, options)?, lost: losses.sentences() })
+}
+
+/// Returns the error of a frame, with its name.
+fn at(name: &str, error: ImportError) -> ImportError {
+    let name = name.escape_debug();
+    match error {
+        ImportError::Io(error) => io::Error::new(error.kind(), format!("its file {name}: {error}")).into(),
+        ImportError::Unsupported(reason) => ImportError::unsupported(format!("its file {name} {reason}")),
+        error => ImportError::damaged(format!("its file {name} {error}")),
+    }
+}
+
+/// Returns the beginning and the number of a name that a frame may have.
+fn number(name: &str) -> Option<(&str, u64)> {
+    let stem = name.strip_suffix(".ply")?;
+    let stem = stem.strip_suffix(".compressed").unwrap_or(stem);
+    let beginning = stem.trim_end_matches(|c: char| c.is_ascii_digit());
+    Some((beginning, stem.strip_prefix(beginning)?.parse().ok()?))
+}
+
+/// Returns the names of frames, by their numbers; other names are left out.
+fn ordered(names: Vec<String>) -> Result<Vec<String>, ImportError> {
+    let mut frames: Vec<(u64, String)> = names
+        .into_iter()
+        .filter_map(|name| number(&name).map(|(_, number)| number).map(|number| (number, name)))
+        .collect();
+    frames.sort();
+    if frames.len() < 2 {
+        return Err(ImportError::unsupported(format!("is a folder without a sequence: {NAMES}")));
+    }
+    for pair in frames.windows(2) {
+        let [(first, a), (second, b)] = pair else { continue };
+        let (a_shown, b_shown) = (a.escape_debug(), b.escape_debug());
+        if number(a).map(|(beginning, _)| beginning) != number(b).map(|(beginning, _)| beginning) {
+            let message =
+                format!("has the frames of two sequences ({a_shown}, {b_shown}): move each into a folder of its own");
+            return Err(ImportError::unsupported(message));
+        }
+        if first == second {
+            let message = format!("has two files of frame {first} ({a_shown}, {b_shown}): keep one of them");
+            return Err(ImportError::unsupported(message));
+        }
+    }
+    Ok(frames.into_iter().map(|(_, name)| name).collect())
+}
+
+/// Appends the Gaussians of a frame. The lower degree of color is raised to the other.
+fn append(all: &mut Columns, mut frame: Columns) {
+    let degree = all.harmonics.degree.max(frame.harmonics.degree);
+    raise(&mut all.harmonics, degree);
+    raise(&mut frame.harmonics, degree);
+    all.mean.append(&mut frame.mean);
+    all.log_scale.append(&mut frame.log_scale);
+    all.rotation.append(&mut frame.rotation);
+    all.opacity_logit.append(&mut frame.opacity_logit);
+    all.harmonics.values.append(&mut frame.harmonics.values);
+}
+
+/// Raises a degree of color; the new coefficients are 0.
+fn raise(harmonics: &mut Harmonics, degree: u32) {
+    if harmonics.degree == degree {
+        return;
+    }
+    let (from, to) = (harmonics.coefficients * 3, (degree as usize + 1).pow(2) * 3);
+    let mut values = vec![0.0; harmonics.values.len() / from * to];
+    for (to, from) in values.chunks_exact_mut(to).zip(harmonics.values.chunks_exact(from)) {
+        to[..from.len()].copy_from_slice(from);
+    }
+    *harmonics = Harmonics { coefficients: to / 3, degree, degree_t: 0, values };
+}
+
+/// What frames lose: the sentences of the first frame that loses anything, and the number of such frames.
+#[derive(Default)]
+struct Losses {
+    name: String,
+    sentences: Vec<String>,
+    frames: usize,
+}
+
+impl Losses {
+    fn add(&mut self, name: &str, sentences: Vec<String>) {
+        if sentences.is_empty() {
+            return;
+        }
+        if self.frames == 0 {
+            name.clone_into(&mut self.name);
+            self.sentences = sentences;
+        }
+        self.frames += 1;
+    }
+
+    fn sentences(self) -> Vec<String> {
+        let others = match self.frames {
+            0 | 1 => String::new(),
+            frames => format!(" and {} other frames", frames - 1),
+        };
+        self.sentences.iter().map(|sentence| format!("{}{others}: {sentence}", self.name)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::ply::fixture::File;
+    use super::*;
+    use crate::scene::{Form, SceneForm};
+
+    fn frames(files: &[(&str, Vec<u8>)]) -> Vec<Frame<'static>> {
+        let frame = |(name, bytes): &(&str, Vec<u8>)| {
+            let (name, bytes) = ((*name).to_owned(), bytes.clone());
+            Frame { name, bytes: Box::new(move || Ok(bytes)) }
+        };
+        files.iter().map(frame).collect()
+    }
+
+    fn refusal(files: &[(&str, Vec<u8>)]) -> String {
+        read(frames(files).into_iter(), &ReadOptions::default()).expect_err("the sequence is refused").to_string()
+    }
+
+    #[test]
+    fn each_frame_is_active_in_its_own_segment() {
+        let files = [3, 0, 2].map(|count| ("", File::splats(count, if count == 2 { 9 } else { 0 }).little()));
+        let options = ReadOptions { fps: Some(2.0), ..ReadOptions::default() };
+        let scene = read(frames(&files).into_iter(), &options).expect("three frames").scene;
+        assert_eq!(scene.trained_with.time_interval, [0.0, 1.5], "three frames at two a second");
+        assert_eq!(scene.playback.duration_seconds, 1.5, "in seconds");
+        let filter = scene.filter.as_ref().expect("a filter");
+        assert_eq!(filter.active_counts(0..5), [3, 0, 2], "each frame has its own Gaussians");
+        assert_eq!([0.1, 0.6, 1.5].map(|time| filter.segment_of(time, [0.0, 1.5])), [0, 1, 2], "frames in order");
+        let SceneForm::Ready(Form::Sliced(sliced)) = &scene.form else { panic!("the sliced form") };
+        let always =
+            sliced.gaussians.iter().all(|gaussian| gaussian.sigma_t.is_infinite() && gaussian.velocity == [0.0; 3]);
+        assert!(always, "Gaussians neither move nor fade");
+        let (first, last) = (File::splats(3, 0), File::splats(2, 9));
+        assert_eq!(sliced.harmonics.degree, 1, "the highest degree of color");
+        assert_eq!(
+            sliced.harmonics.of(2)[..3],
+            ["f_dc_0", "f_dc_1", "f_dc_2"].map(|name| first.value(name, 2)),
+            "colors"
+        );
+        assert_eq!(sliced.harmonics.of(2)[3..], [0.0; 9], "new coefficients are 0");
+        assert_eq!(sliced.harmonics.of(4)[3], last.value("f_rest_0", 1), "coefficients of the last frame");
+        assert_eq!(
+            sliced.gaussians[4].mean,
+            ["x", "y", "z"].map(|name| last.value(name, 1)),
+            "means of the last frame"
+        );
+    }
+
+    #[test]
+    fn a_frame_that_cannot_be_read_is_named() {
+        let good = File::splats(1, 0).little();
+        let message = refusal(&[("frame_1.ply", good.clone()), ("frame_2.ply", good[..90].to_owned())]);
+        assert!(message.contains("frame_2.ply") && message.contains("cut"), "the frame and the fault: {message}");
+        let moving = File::splats(1, 0).with("time", |_| 0.0).with("log_duration", |_| 0.0).little();
+        let message = refusal(&[("frame_1.ply", moving)]);
+        assert!(message.contains("frame_1.ply") && message.contains("moving"), "a frame with motion: {message}");
+        assert!(refusal(&[]).contains("0 frames"), "no frames");
+        let fails = || Frame { name: "gone.ply".to_owned(), bytes: Box::new(|| Err(io::Error::other("it is gone"))) };
+        let message = read([fails()].into_iter(), &ReadOptions::default()).expect_err("it is gone").to_string();
+        assert!(message.contains("gone.ply: it is gone"), "a file that cannot be opened: {message}");
+        let lossy = File { comments: vec!["antialiased 1".to_owned()], ..File::splats(1, 0) }.little();
+        let three = ["a1.ply", "a2.ply", "a3.ply"].map(|name| (name, lossy.clone()));
+        let lost = read(frames(&three).into_iter(), &ReadOptions::default()).expect("three frames").lost;
+        assert_eq!(lost.len(), 1, "one sentence for all frames: {lost:?}");
+        assert!(lost[0].starts_with("a1.ply and 2 other frames: "), "that says how many: {lost:?}");
+    }
+
+    #[test]
+    fn frames_are_ordered_by_their_numbers() {
+        let names = |names: &[&str]| ordered(names.iter().map(|&name| name.to_owned()).collect());
+        let found = names(&["f10.ply", "f9.compressed.ply", "notes.txt", "f007.ply", "model.ply"]);
+        assert_eq!(found.expect("a sequence"), ["f007.ply", "f9.compressed.ply", "f10.ply"], "by number, not by name");
+        for (files, reason) in [
+            (&["f1.ply"][..], "without a sequence"),
+            (&["a.ply", "b.ply"], "without a sequence"),
+            (&["f1.ply", "g2.ply"], "two sequences"),
+            (&["f1.ply", "f01.ply", "f2.ply"], "two files of frame 1"),
+        ] {
+            let message = names(files).expect_err("no sequence").to_string();
+            assert!(message.contains(reason), "{files:?}: {message}");
+        }
+        let many = names(&["f99999999999999999999.ply", "f1.ply", "f2.ply"]).expect("a sequence");
+        assert_eq!(many, ["f1.ply", "f2.ply"], "a number that is too large is none");
+    }
+}

@@ -1,0 +1,232 @@
+//! Exports.
+//!
+//! In: synthetic scenes. Out: proof that the files show the scene at their time, or with its motion, when they are read again.
+
+use bevy_gs4d::codec::{ReadOptions, load};
+use bevy_gs4d::gaussian::{Gaussian, Harmonics};
+use bevy_gs4d::internal::codec::export::{Export, Exporter};
+use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use bevy_gs4d::scene::{
+    ActiveSets, FilterKind, Form, GaussianScene, RuntimeScene, SceneForm, Sliced, TemporalFilter, Trained, UpAxis,
+};
+use glam::Vec3;
+use std::fs;
+use std::path::Path;
+
+fn exporter(scene: &GaussianScene, id: &str) -> Exporter {
+    Exporter::new(scene.clone(), Export::of_id(id).expect("a format"), 30.0).expect("the scene can be exported")
+}
+
+/// Returns the bytes of a file.
+fn bytes(exporter: &Exporter, time: f32) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    exporter.write(time, &mut bytes).expect("memory can be written to");
+    bytes
+}
+
+/// Returns a scene after an export and a second import.
+fn again(scene: &GaussianScene, id: &str, time: f32) -> GaussianScene {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let export = Export::of_id(id).expect("a format");
+    let path = folder.path().join(format!("again.{}", export.extension));
+    fs::write(&path, bytes(&exporter(scene, id), time)).expect("the folder can be written to");
+    load(&path, &ReadOptions::default()).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Returns a scene of native 4D Gaussians, with color that changes in time.
+fn moving() -> GaussianScene {
+    let mut scene = synthesize(&SynthSettings { count: 400, ..SynthSettings::default() });
+    scene.playback.up = UpAxis::NegY;
+    scene
+}
+
+/// Returns a scene at rest with color of this degree.
+fn resting(degree: u32) -> GaussianScene {
+    let mut scene = moving();
+    scene.form.truncate_colors(degree, 0);
+    let SceneForm::Trained(Trained { parameters, .. }) = &mut scene.form else { panic!("the trained form") };
+    (parameters.mean_t, parameters.log_scale_t, parameters.rotation_r) = Default::default();
+    scene
+}
+
+fn sliced(scene: &GaussianScene) -> (Vec<Gaussian>, Harmonics) {
+    let RuntimeScene { form: Form::Sliced(Sliced { gaussians, harmonics }), .. } =
+        scene.clone().into_runtime().expect("it can be drawn")
+    else {
+        panic!("the sliced form")
+    };
+    (gaussians, harmonics)
+}
+
+fn assert_same_shape(found: &Gaussian, expected: &Gaussian, what: &str) {
+    let largest = expected.covariance.iter().fold(0.0f32, |most, value| most.max(value.abs()));
+    for (found, expected) in found.covariance.iter().zip(expected.covariance) {
+        assert!((found - expected).abs() <= largest * 1e-5 + 1e-12, "{what}: covariance {found} is {expected}");
+    }
+}
+
+#[test]
+fn parameters_at_rest_come_back_bit_for_bit() {
+    for degree in 0..=3 {
+        let scene = resting(degree);
+        let found = again(&scene, "ply", 0.0);
+        assert!(found.form == scene.form, "degree {degree}: every parameter and every coefficient");
+    }
+}
+
+#[test]
+fn a_file_of_one_time_shows_what_is_drawn_then() {
+    let scene = moving();
+    let (all, colors) = sliced(&scene);
+    let span = scene.trained_with.time_span();
+    for time in [0.0, 0.37, 0.9] {
+        let (found, found_colors) = sliced(&again(&scene, "ply", time));
+        let drawn: Vec<usize> = (0..all.len()).filter(|&i| all[i].marginal(time) > 0.05).collect();
+        assert!(drawn.len() < all.len() && !drawn.is_empty(), "some are drawn at {time}");
+        assert_eq!(found.len(), drawn.len(), "at {time}, the Gaussians that are drawn");
+        assert_eq!((found_colors.degree, found_colors.degree_t), (3, 0), "color without time");
+        for (at, &index) in drawn.iter().enumerate() {
+            let (found, expected) = (&found[at], &all[index]);
+            let what = format!("Gaussian {index} at {time}");
+            assert_eq!(Vec3::from(found.mean), expected.mean_at(time), "{what}: where it is");
+            assert_same_shape(found, expected, &what);
+            let opacity = expected.opacity * expected.marginal(time);
+            assert!((found.opacity - opacity).abs() < 1e-6, "{what}: {} is {opacity}", found.opacity);
+            let direction = Vec3::new(0.3, -0.5, 0.8).normalize();
+            let expected = colors.color(index, direction, expected.mean_t - time, span);
+            let color = found_colors.color(at, direction, 0.0, 1.0);
+            assert!(color.abs_diff_eq(expected, 1e-5), "{what}: {color} is {expected}");
+        }
+    }
+}
+
+#[test]
+fn a_filter_and_packed_gaussians_are_exported_as_they_are_drawn() {
+    let mut scene = moving();
+    let (all, _) = sliced(&scene);
+    let intervals = (0..all.len() as u32).map(|i| (i % 2) | (i % 2) << 16).collect();
+    let sets = ActiveSets::Intervals(intervals);
+    scene.filter = Some(TemporalFilter { kind: FilterKind::KeyFrame, segments: 2, count: all.len(), sets });
+    let found = sliced(&again(&scene, "ply", 0.25)).0;
+    let drawn = (0..all.len()).filter(|&i| i % 2 == 0 && all[i].marginal(0.25) > 0.05).count();
+    assert_eq!(found.len(), drawn, "half of the Gaussians are active in the first segment");
+}
+
+#[test]
+fn lines_and_lifespans_come_back_from_free_time() {
+    let mut scene = moving();
+    scene.form.truncate_colors(3, 0);
+    scene.trained_with.time_interval = [-0.5, 1.5];
+    scene.playback.duration_seconds = 2.0;
+    let found = again(&scene, "free-time", 0.0);
+    assert_eq!(found.playback.duration_seconds, 2.0, "the length of the clip");
+    let ((found, found_colors), (all, colors)) = (sliced(&found), sliced(&scene));
+    assert_eq!(found.len(), all.len(), "all Gaussians");
+    assert!(found_colors.values == colors.values, "colors are not changed");
+    for (index, (found, expected)) in found.iter().zip(&all).enumerate() {
+        let what = format!("Gaussian {index}");
+        assert_same_shape(found, expected, &what);
+        assert!((found.opacity - expected.opacity).abs() < 1e-6, "{what}: opacity");
+        for time in [-0.5f32, 0.2, 1.1] {
+            let place = (time + 0.5) / 2.0;
+            let mean = found.mean_at(place);
+            let far = expected.velocity.iter().fold(1.0f32, |most, v| most.max(v.abs()));
+            assert!(mean.abs_diff_eq(expected.mean_at(time), far * 1e-5), "{what} at {time}: {mean}");
+            let (marginal, expected) = (found.marginal(place), expected.marginal(time));
+            assert!((marginal - expected).abs() < 1e-4, "{what} at {time}: marginal {marginal} is {expected}");
+        }
+    }
+}
+
+#[test]
+fn color_in_time_is_exported_as_its_mean_over_the_life() {
+    let scene = moving();
+    let exporter = exporter(&scene, "free-time");
+    assert!(exporter.lost().iter().any(|sentence| sentence.contains("mean")), "it is stated: {:?}", exporter.lost());
+    let ((_, found), (all, colors)) = (sliced(&again(&scene, "free-time", 0.0)), sliced(&scene));
+    let direction = Vec3::new(0.6, 0.0, 0.8);
+    let (mut by_mean, mut without) = (0.0, 0.0);
+    for (index, gaussian) in all.iter().enumerate() {
+        for step in 0..=50 {
+            let time = step as f32 / 50.0;
+            let weight = gaussian.marginal(time);
+            let exact = colors.color(index, direction, gaussian.mean_t - time, 1.0);
+            let mut plain = colors.clone();
+            plain.truncate(3, 0);
+            by_mean += weight * found.color(index, direction, 0.0, 1.0).distance_squared(exact);
+            if step % 10 == 0 {
+                without += 10.0 * weight * plain.color(index, direction, 0.0, 1.0).distance_squared(exact);
+            }
+        }
+        if index > 20 {
+            break;
+        }
+    }
+    assert!(by_mean < without, "the mean ({by_mean}) is nearer than the color without time ({without})");
+}
+
+#[test]
+fn a_sequence_comes_back_frame_by_frame() {
+    let (scene, folder) = (moving(), tempfile::tempdir().expect("a temporary folder"));
+    let (exporter, times) = (exporter(&scene, "ply"), [0.125, 0.375, 0.625, 0.875]);
+    let mut counts = Vec::new();
+    for (frame, &time) in times.iter().enumerate() {
+        let mut bytes = Vec::new();
+        counts.push(exporter.write(time, &mut bytes).expect("memory can be written to") as u32);
+        fs::write(folder.path().join(format!("frame_{frame}.ply")), bytes).expect("the folder can be written to");
+    }
+    fs::write(folder.path().join("notes.txt"), "no frame").expect("the folder can be written to");
+    let options = ReadOptions { fps: Some(4.0), ..ReadOptions::default() };
+    let sequence = load(folder.path(), &options).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(sequence.trained_with.time_interval, [0.0, 1.0], "four frames at four a second");
+    let filter = sequence.filter.as_ref().expect("a filter");
+    assert_eq!(filter.active_counts(0..sequence.len()), counts, "each frame has its own Gaussians");
+    for time in times {
+        let (expected, found) = (sliced(&again(&scene, "ply", time)).0, sliced(&again(&sequence, "ply", time)).0);
+        let means = |gaussians: &[Gaussian]| gaussians.iter().map(|gaussian| gaussian.mean).collect::<Vec<_>>();
+        assert!(means(&found) == means(&expected), "the frame at {time} is that of the capture");
+    }
+    let refused =
+        Exporter::new(sequence, Export::of_id("free-time").expect("a format"), 4.0).expect_err("no lifespans");
+    assert!(refused.to_string().contains("--sequence"), "frames have no lifespans: {refused}");
+}
+
+#[test]
+fn folders_without_a_sequence_are_refused_with_the_rule() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let message = |path: &Path| load(path, &ReadOptions::default()).expect_err("no capture").to_string();
+    assert!(message(folder.path()).contains("frame_0001.ply"), "an empty folder: the names are described");
+    fs::write(folder.path().join("frame_1.ply"), "ply\n").expect("the folder can be written to");
+    assert!(message(folder.path()).contains("two or more files"), "one file is no sequence");
+    fs::write(folder.path().join("frame_2.ply"), "ply\n").expect("the folder can be written to");
+    assert!(message(folder.path()).contains("frame_1.ply"), "a damaged frame is named");
+}
+
+#[test]
+fn splat_files_come_back_within_their_steps() {
+    let scene = resting(0);
+    let (found, expected) = (again(&scene, "splat", 0.0), scene);
+    let (SceneForm::Trained(found), SceneForm::Trained(expected)) = (&found.form, &expected.form) else {
+        panic!("the trained form")
+    };
+    let opacity = |logit: f32| 1.0 / (1.0 + (-logit).exp());
+    assert_eq!(found.parameters.mean, expected.parameters.mean, "means are floats");
+    for index in 0..expected.parameters.len() {
+        let (a, b) = (&found.parameters, &expected.parameters);
+        for axis in 0..3 {
+            assert!((a.log_scale[index][axis] - b.log_scale[index][axis]).abs() < 1e-5, "scale {axis} of {index}");
+            let (a, b) = (found.harmonics.of(index)[axis], expected.harmonics.of(index)[axis]);
+            let [a, b] = [a, b].map(|value| (0.5 + 0.282_094_8 * value).clamp(0.0, 1.0));
+            assert!((a - b).abs() <= 0.5 / 255.0 + 1e-5, "channel {axis} of {index}: {a} is {b}");
+        }
+        let (a, b) = (opacity(a.opacity_logit[index]), opacity(b.opacity_logit[index]));
+        assert!((a - b).abs() <= 0.5 / 255.0 + 1e-5, "opacity of {index}: {a} is {b}");
+    }
+    let cut = tempfile::tempdir().expect("a temporary folder");
+    for (length, reason) in [(33, "no multiple of the 32 bytes"), (0, "neither a checkpoint")] {
+        let path = cut.path().join("cut.splat");
+        fs::write(&path, vec![0; length]).expect("the folder can be written to");
+        let message = load(&path, &ReadOptions::default()).expect_err("no .splat file").to_string();
+        assert!(message.contains(reason), "{length} bytes: {message}");
+    }
+}

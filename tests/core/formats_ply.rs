@@ -1,0 +1,166 @@
+//! PLY and `.splat` files of other makes.
+//!
+//! In: the folder `formats` of the data that `GS4D_DATA` names. Out: proof that each file has the values that an independent reader finds.
+
+use crate::support::data::data;
+use bevy_gs4d::codec::{ReadOptions, load};
+use bevy_gs4d::gaussian::{Gaussian, Harmonics};
+use bevy_gs4d::scene::{Form, GaussianScene, RuntimeScene, SceneForm};
+use std::path::PathBuf;
+
+/// The factor of the coefficient of degree 0.
+const SH_C0: f32 = 0.282_094_8;
+
+fn folder() -> Option<PathBuf> {
+    Some(data()?.join("formats")).filter(|folder| folder.is_dir())
+}
+
+fn open(folder: &PathBuf, name: &str, count: usize) -> GaussianScene {
+    let scene = load(&folder.join(name), &ReadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(scene.len(), count, "{name}: number of Gaussians");
+    scene
+}
+
+/// Raw values of a static scene: means, logarithms of scales, unit quaternions, opacities and colors.
+struct Still {
+    mean: Vec<[f32; 3]>,
+    log_scale: Vec<[f32; 3]>,
+    rotation: Vec<[f32; 4]>,
+    opacity: Vec<f32>,
+    harmonics: Harmonics,
+}
+
+fn still(scene: GaussianScene) -> Still {
+    let SceneForm::Trained(trained) = scene.form else { panic!("Gaussians at rest have the trained form") };
+    let parameters = trained.parameters;
+    let unit = |q: &[f32; 4]| {
+        let length = q.iter().map(|c| c * c).sum::<f32>().sqrt();
+        q.map(|c| c / length)
+    };
+    Still {
+        rotation: parameters.rotation_l.iter().map(unit).collect(),
+        opacity: parameters.opacity_logit.iter().map(|logit| 1.0 / (1.0 + (-logit).exp())).collect(),
+        mean: parameters.mean,
+        log_scale: parameters.log_scale,
+        harmonics: trained.harmonics,
+    }
+}
+
+fn moving(scene: GaussianScene) -> (Vec<Gaussian>, Harmonics) {
+    let RuntimeScene { form: Form::Sliced(sliced), .. } = scene.into_runtime().expect("it can be drawn") else {
+        panic!("the sliced form")
+    };
+    (sliced.gaussians, sliced.harmonics)
+}
+
+fn assert_near<const N: usize>(found: [f32; N], expected: [f32; N], tolerance: f32, what: &str) {
+    let is_near = found.iter().zip(expected).all(|(found, expected)| (found - expected).abs() <= tolerance);
+    assert!(is_near, "{what}: {found:?} is {expected:?}, up to {tolerance}");
+}
+
+fn extremes(means: &[[f32; 3]]) -> [[f32; 3]; 2] {
+    let extreme = |fold: fn(f32, f32) -> f32| {
+        [0, 1, 2].map(|axis| means.iter().map(|mean| mean[axis]).reduce(fold).expect("a Gaussian"))
+    };
+    [extreme(f32::min), extreme(f32::max)]
+}
+
+#[test]
+fn ply_of_other_makes_has_the_values_of_an_independent_reader() {
+    let Some(folder) = folder() else { return };
+    let cloud = still(open(&folder, "splat-transform/cloud_sh3.ply", 200));
+    assert_near(cloud.mean[0], [0.04103, 1.0878, 1.22472], 6e-6, "mean");
+    assert_near(cloud.log_scale[0], [-6.43256, -2.90821, -4.00843], 6e-6, "scales");
+    assert_near([cloud.opacity[0]], [0.69058], 6e-6, "opacity");
+    assert_eq!(cloud.harmonics.degree, 3, "degree 3");
+    assert_near(cloud.harmonics.of(0)[..3].try_into().expect("three"), [0.15781, 0.06362, 1.04565], 6e-6, "color");
+    let rest = cloud.harmonics.of(0)[3..6].try_into().expect("three");
+    assert_near(rest, [-0.00906, 0.28329, -0.00665], 6e-6, "the first coefficient of degree 1");
+
+    let packed = still(open(&folder, "splat-transform/cloud_sh3.compressed.ply", 200));
+    assert_eq!(packed.harmonics.degree, 3, "degree 3");
+    for (index, mean) in packed.mean.iter().enumerate() {
+        let distance = |other: &[f32; 3]| other.iter().zip(mean).map(|(a, b)| (a - b).powi(2)).sum::<f32>();
+        let of = (0..200).min_by(|&a, &b| distance(&cloud.mean[a]).total_cmp(&distance(&cloud.mean[b]))).expect("one");
+        assert_near(*mean, cloud.mean[of], 0.002, "the mean of a Gaussian of the source");
+        assert_near([packed.opacity[index]], [cloud.opacity[of]], 0.003, "its opacity");
+        let expected = &cloud.harmonics.of(of)[3..];
+        for (found, expected) in packed.harmonics.of(index)[3..].iter().zip(expected) {
+            assert!((found - expected).abs() <= 1.0 / 60.0, "coefficient {found} of {index} is {expected}");
+        }
+        let turn: f32 = packed.rotation[index].iter().zip(cloud.rotation[of]).map(|(a, b)| a * b).sum();
+        assert!(turn.abs() > 0.99999, "the rotation of {index}");
+    }
+}
+
+#[test]
+fn compressed_ply_of_playcanvas_has_the_values_of_an_independent_reader() {
+    let Some(folder) = folder() else { return };
+    let small = still(open(&folder, "playcanvas/test64.compressed.ply", 64));
+    assert_near(extremes(&small.mean)[0], [-1.39469, -0.89565, 0.29708], 6e-6, "least means");
+    assert_near(small.rotation[0], [0.9347, -0.16935, -0.27026, 0.1569], 6e-6, "rotation");
+    assert_near([small.opacity[0]], [48.0 / 255.0], 1e-6, "opacity");
+    let rest = small.harmonics.of(0)[3..6].try_into().expect("three");
+    assert_near(rest, [0.04688, 0.04688, 0.01562], 6e-6, "the first coefficient of degree 1");
+
+    let biker = still(open(&folder, "playcanvas/biker.compressed.ply", 152_746));
+    let [least, most] = extremes(&biker.mean);
+    assert_near(least, [-0.62134, -3.18018, -0.53223], 2e-4, "least means");
+    assert_near(most, [0.41431, 0.0, 0.61328], 2e-4, "largest means");
+    assert_near(biker.mean[0], [-0.10449, -2.38794, -0.36084], 1.4e-4, "the first mean");
+    assert_near(biker.log_scale[0], [-6.0625, -4.1875, -7.0625], 0.035, "its scales");
+    assert_near([biker.opacity[0]], [18.0 / 255.0], 1e-6, "its opacity");
+    assert_near(biker.harmonics.of(0)[..3].try_into().expect("three"), [0.53595, 0.5098, 0.56209], 0.014, "its color");
+    let turn: f32 = biker.rotation[0].iter().zip([-0.4608, -0.06227, -0.88504, 0.02214]).map(|(a, b)| a * b).sum();
+    // The file beside it has the rotation after a half turn around x: (w, x, -y, -z).
+    let half: f32 = biker.rotation[0].iter().zip([-0.4608, 0.06227, -0.88504, -0.02214]).map(|(a, b)| a * b).sum();
+    assert!(turn.abs().max(half.abs()) > 0.9999, "its rotation: {:?}", biker.rotation[0]);
+    let mean = biker.opacity.iter().map(|&opacity| f64::from(opacity)).sum::<f64>() / 152_746.0;
+    assert!((mean - 0.29663).abs() < 6e-6, "the mean opacity: {mean}");
+}
+
+#[test]
+fn splat_files_have_the_values_of_an_independent_reader() {
+    let Some(folder) = folder() else { return };
+    let grid = still(open(&folder, "splat-transform/minimal.splat", 4));
+    assert_eq!(extremes(&grid.mean), [[-1.0, 0.0, -1.0], [0.0, 0.0, 0.0]], "the corners of the grid");
+    for index in 0..4 {
+        assert_near(grid.log_scale[index], [0.1f32.ln(); 3], 1e-6, "scales");
+        assert_near(grid.rotation[index].map(f32::abs), [0.0, 0.0, 0.0, 1.0], 1e-6, "rotation");
+        assert_near([grid.opacity[index]], [230.0 / 255.0], 1e-6, "opacity");
+        let color = grid.harmonics.of(index);
+        assert_near([color[0].abs(), color[1].abs()], [0.59082; 2], 6e-6, "red and green");
+        assert!((0.0..=1.0).contains(&(0.5 + SH_C0 * color[2])), "blue is a color");
+    }
+}
+
+#[test]
+fn moving_ply_has_the_values_of_an_independent_reader() {
+    let Some(folder) = folder() else { return };
+    let nearest = |gaussians: &[Gaussian], mean: [f32; 3]| {
+        let distance = |g: &Gaussian| g.mean.iter().zip(mean).map(|(a, b)| (a - b).powi(2)).sum::<f32>();
+        *gaussians.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).expect("a Gaussian")
+    };
+    let scene = open(&folder, "sogst/fountain_d1_sh2_seg.ply", 400);
+    assert_eq!(scene.trained_with.time_interval, [0.5, 2.5], "the times of the clip");
+    assert_eq!(scene.playback.duration_seconds, 2.0, "its length");
+    let (gaussians, harmonics) = moving(scene);
+    assert_eq!(harmonics.degree, 2, "degree 2");
+    let expected = [-1.61803, 0.67541, 1.28334];
+    let found = nearest(&gaussians, expected);
+    assert_near(found.mean, expected, 0.0024, "mean");
+    assert_near(found.velocity, [-1.01329, -2.49677, -1.11242], 8e-5, "velocity");
+    assert_near([found.mean_t], [1.23505], 0.0023, "temporal mean");
+    assert_near([found.sigma_t / 0.01359], [1.0], 0.005, "temporal deviation");
+    assert_near([found.opacity], [123.0 / 255.0], 0.003, "opacity");
+
+    let scene = open(&folder, "sog4d/swarm.ply", 600);
+    assert_eq!(scene.trained_with.time_interval, [1.0, 3.0], "start and duration");
+    let (gaussians, _) = moving(scene);
+    let expected = [-0.21281, -1.32168, -1.53185];
+    let found = nearest(&gaussians, expected);
+    assert_near(found.mean, expected, 0.003, "mean");
+    assert_near(found.velocity, [0.5937, 0.93339, 0.46199], 5e-4, "velocity");
+    assert_near([found.mean_t], [2.66], 0.01, "temporal mean");
+    assert_near([found.sigma_t / 0.1648], [1.0], 0.02, "temporal deviation");
+}
