@@ -142,7 +142,8 @@
 //! | `bevy` (default) | `plugin`: [`asset`], [`playback`], [`render`], [`picker`], [`stereo`]; [`prelude`] | `renderer` |
 //! | `pbr` (default) | [`pbr`]: captures among Bevy's lit meshes | `bevy` |
 //! | `picking` (default) | pointer events on captures | `bevy` |
-//! | `cli` | [`cli`], the `gs4d` command; never compiles Bevy | `offline` |
+//! | `fourdgs` | reading and writing `.4dgs` files | |
+//! | `cli` | [`cli`], the `gs4d` command; never compiles Bevy | `offline`, `fourdgs` |
 //! | `inspector` | [`inspector`]: a panel to watch and control captures with | `bevy` |
 //! | `testing` | [`testing`]: Bevy apps without a window, drawn into pictures | `bevy` |
 //! | `viewer` | what the examples need: a window, lit meshes | `pbr`, `picking`, `inspector`, `testing` |

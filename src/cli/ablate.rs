@@ -10,6 +10,7 @@ use super::report::Report;
 use super::table::{Table, lines};
 use crate::offline::ablation::{AblationRow, AblationSettings, ablate};
 use crate::offline::belonging::require_belonging;
+use crate::offline::convert::require_no_windows;
 use crate::offline::dataset::{Split, require_images};
 use crate::offline::files::Files;
 use crate::offline::metrics::MeanMetrics;
@@ -90,6 +91,8 @@ impl Ablate {
         let progress = &mut Bars::default();
         let start = Instant::now();
         let mut scene = self.checkpoint.load(&self.input)?;
+        let no_windows = require_no_windows(scene.filter.as_ref(), "a comparison of filters");
+        no_windows.map_err(|error| Failure::at(&self.input, &error))?;
         scene.filter = None;
         let (train, measured) = match self.split {
             Measured::Validation => {

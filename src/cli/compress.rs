@@ -10,6 +10,7 @@ use super::report::Report;
 use super::table::{Table, bytes};
 use crate::codec::package;
 use crate::offline::Progress;
+use crate::offline::convert::merge;
 use crate::offline::fidelity::Originals;
 use crate::offline::files::Files;
 use crate::offline::metrics::SquaredError;
@@ -48,6 +49,10 @@ pub(super) struct Compress {
     quality: Quality,
     #[command(flatten)]
     knobs: Knobs,
+    /// First merge Gaussians of consecutive frames of a sequence that differ by at most this part of their scales, opacities and colors; 0 merges
+    /// equal ones [default: none are merged].
+    #[arg(long, value_name = "TOLERANCE", value_parser = values::step)]
+    merge: Option<f32>,
     /// How much the color of each Gaussian counts: scores by `gs4d score`, little-endian float32 in the order of IN
     /// [default: by opacity].
     #[arg(long, value_name = "FILE")]
@@ -155,7 +160,10 @@ impl Compress {
         let files = Files::default().reads_scene(&self.input).reads(&self.weights);
         let out = self.package.checked_file(self.views.add_to(files))?;
         let before = file_size(&self.input)?;
-        let scene = self.checkpoint.load_to_change(&self.input)?;
+        let mut scene = self.checkpoint.load_to_change(&self.input)?;
+        if let Some(tolerance) = self.merge {
+            merge(&mut scene, tolerance).map_err(|error| Failure::at(&self.input, &error))?;
+        }
         require_unpacked(&scene.form).map_err(|error| Failure::at(&self.input, &error))?;
         let scene = scene.into_runtime().map_err(|error| Failure::at(&self.input, &error))?;
         let weights = self.weights.as_ref().map(|path| read_weights(path, scene.len())).transpose()?;

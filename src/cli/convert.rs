@@ -39,6 +39,10 @@ pub(super) struct Convert {
     /// Highest time degree of color that is kept, 0 to 2 [default: all].
     #[arg(long, value_name = "D", value_parser = clap::value_parser!(u32).range(0..=2))]
     sh_degree_t: Option<u32>,
+    /// Merge Gaussians of consecutive frames of a sequence that differ by at most this part of their scales, opacities and colors; 0 merges equal
+    /// ones [default: none are merged].
+    #[arg(long, value_name = "TOLERANCE", value_parser = values::step)]
+    merge: Option<f32>,
     #[command(flatten)]
     checkpoint: CheckpointArgs,
 }
@@ -54,7 +58,8 @@ impl Convert {
         }
         let out = self.package.checked_out(Files::default().reads_scene(&self.input))?;
         let before = file_size(&self.input)?;
-        let settings = ConvertSettings { form: self.form, sh_degree: self.sh_degree, sh_degree_t: self.sh_degree_t };
+        let (form, sh_degree, sh_degree_t, merge) = (self.form, self.sh_degree, self.sh_degree_t, self.merge);
+        let settings = ConvertSettings { form, sh_degree, sh_degree_t, merge };
         let scene = convert(self.checkpoint.load_to_change(&self.input)?, &settings);
         let scene = scene.map_err(|error| Failure::at(&self.input, &error))?;
         let after = self.package.save(&scene)?;

@@ -8,6 +8,7 @@ use super::failure::Failure;
 use super::progress::Bars;
 use super::report::{Report, switches_json};
 use super::table::{Table, lines};
+use crate::offline::convert::require_no_windows;
 use crate::offline::dataset::Split;
 use crate::offline::engine::Engine;
 use crate::offline::evaluation::{color_name, contrast, evaluate_scene, without_contrast};
@@ -110,6 +111,8 @@ impl Eval {
         let scene = self.checkpoint.load(&self.scene)?;
         let mut scene = scene.into_runtime().map_err(|error| Failure::at(&self.scene, &error))?;
         if self.no_filter {
+            let no_windows = require_no_windows(scene.filter.as_ref(), "--no-filter");
+            no_windows.map_err(|error| Failure::at(&self.scene, &error))?;
             scene.filter = None;
         }
         let mut dataset = self.data.open(self.split, &scene.trained_with, progress)?;

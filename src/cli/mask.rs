@@ -8,6 +8,7 @@ use super::failure::Failure;
 use super::progress::Bars;
 use super::report::Report;
 use super::table::{bytes, lines};
+use crate::offline::convert::require_no_windows;
 use crate::offline::dataset::TrainingView;
 use crate::offline::engine::Engine;
 use crate::offline::files::Files;
@@ -64,6 +65,8 @@ impl Mask {
         self.check_options()?;
         let out = self.package.checked_out(self.data.add_to(Files::default().reads_scene(&self.input)))?;
         let mut scene = self.checkpoint.load_to_change(&self.input)?;
+        let no_windows = require_no_windows(scene.filter.as_ref(), "another filter");
+        no_windows.map_err(|error| Failure::at(&self.input, &error))?;
         scene.filter = None;
         let by_views = needs_views(self.filter);
         let views = if by_views || self.every.is_some() {

@@ -5,9 +5,9 @@
 
 use super::checkpoint;
 use super::error::CodecErrorKind;
+use super::fourdgs;
 use super::import::source::Source;
-use super::import::{ImportError, Imported};
-use super::import::{gltf, ply, sequence, sog, splat, splatv, spz};
+use super::import::{ImportError, Imported, gltf, npz, ply, sequence, sog, splat, splatv, spz};
 use super::options::ReadOptions;
 use super::package::{self, PackageInfo, WriteSettings};
 use super::start::{Start, ZIP};
@@ -68,20 +68,20 @@ pub const FORMATS: &[Format] = &[
         inspect: Some(inspect_package),
     },
     Format {
+        id: "spz",
+        name: "an SPZ file (.spz)",
+        extensions: &["spz"],
+        is_of: spz::is_of,
+        read: Read::Bytes(spz::read),
+        write: None,
+        inspect: None,
+    },
+    Format {
         id: "splatv",
         name: "a capture of the player splaTV (.splatv)",
         extensions: splatv::EXTENSIONS,
         is_of: splatv::is_of,
         read: Read::Bytes(splatv::read),
-        write: None,
-        inspect: None,
-    },
-    Format {
-        id: "ply",
-        name: "a PLY of Gaussians (.ply)",
-        extensions: &["ply", "ply4d"],
-        is_of: |start| ply::is_ply(&start.bytes),
-        read: Read::Bytes(ply::read),
         write: None,
         inspect: None,
     },
@@ -95,20 +95,38 @@ pub const FORMATS: &[Format] = &[
         inspect: None,
     },
     Format {
+        id: "4dgs",
+        name: "a capture of the 4dgs format (.4dgs)",
+        extensions: fourdgs::EXTENSIONS,
+        is_of: fourdgs::is_of,
+        read: Read::Bytes(fourdgs::read),
+        write: None,
+        inspect: None,
+    },
+    Format {
+        id: "dynamic-3dgs",
+        name: "parameters of Dynamic 3D Gaussians (.npz)",
+        extensions: npz::EXTENSIONS,
+        is_of: npz::is_of,
+        read: Read::Bytes(npz::read),
+        write: None,
+        inspect: None,
+    },
+    Format {
+        id: "ply",
+        name: "a PLY of Gaussians (.ply)",
+        extensions: &["ply", "ply4d"],
+        is_of: |start| ply::is_ply(&start.bytes),
+        read: Read::Bytes(ply::read),
+        write: None,
+        inspect: None,
+    },
+    Format {
         id: "sequence",
         name: "a folder of numbered PLY files",
         extensions: &[],
         is_of: |start| sequence::is_sequence(&start.entries),
         read: Read::Folder(sequence::read_folder),
-        write: None,
-        inspect: None,
-    },
-    Format {
-        id: "spz",
-        name: "an SPZ file (.spz)",
-        extensions: &["spz"],
-        is_of: spz::is_of,
-        read: Read::Bytes(spz::read),
         write: None,
         inspect: None,
     },
@@ -145,6 +163,15 @@ impl Format {
         path.extension()
             .is_some_and(|found| self.extensions.iter().any(|extension| found.eq_ignore_ascii_case(extension)))
     }
+}
+
+/// Returns the extensions of files of other makes, without the dot.
+pub fn imported_extensions() -> Vec<&'static str> {
+    let imported = FORMATS.iter().filter(|format| matches!(format.read, Read::Bytes(_)));
+    let mut extensions: Vec<&str> = imported.flat_map(|format| format.extensions).copied().collect();
+    extensions.sort_unstable();
+    extensions.dedup();
+    extensions
 }
 
 /// Returns the message about a file of no known format.
@@ -198,9 +225,10 @@ mod tests {
 
     #[test]
     fn the_message_about_an_unknown_format_names_every_format() {
-        let expected = "neither a checkpoint of the 4DGS trainer (.pth, a zip archive), a package (.gs4d), a capture of the player splaTV (.splatv), \
-                        a PLY of Gaussians (.ply), a SOG (.sog, .sogst, .sog4d, .tsog, or the meta.json or lod-meta.json of one), \
-                        a folder of numbered PLY files, an SPZ file (.spz), a glTF file with Gaussians (.glb or .gltf) nor a .splat file (.splat)";
+        let expected = "neither a checkpoint of the 4DGS trainer (.pth, a zip archive), a package (.gs4d), an SPZ file (.spz), \
+                        a capture of the player splaTV (.splatv), a SOG (.sog, .sogst, .sog4d, .tsog, or the meta.json or lod-meta.json \
+                        of one), a capture of the 4dgs format (.4dgs), parameters of Dynamic 3D Gaussians (.npz), a PLY of Gaussians \
+                        (.ply), a folder of numbered PLY files, a glTF file with Gaussians (.glb or .gltf) nor a .splat file (.splat)";
         assert_eq!(unknown(), expected, "every format by name and extension");
     }
 

@@ -3,7 +3,8 @@
 //! In: a scene, a target form, color degrees. Out: the scene in that form, with those degrees.
 
 use super::OfflineError;
-use crate::scene::{ColorDegrees, Form, GaussianScene, SceneForm};
+use crate::scene::merge_neighbors::merge_neighbors;
+use crate::scene::{ColorDegrees, Form, GaussianScene, SceneForm, TemporalFilter};
 
 /// A form to convert to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,7 +21,7 @@ impl TargetForm {
 }
 
 /// Changes of a scene; `None` keeps the form or the degree. Default: all `None`.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ConvertSettings {
     /// Target form.
     pub form: Option<TargetForm>,
@@ -28,6 +29,8 @@ pub struct ConvertSettings {
     pub sh_degree: Option<u32>,
     /// Highest time degree of color to keep, 0 to 2.
     pub sh_degree_t: Option<u32>,
+    /// Merge Gaussians of consecutive frames that differ by at most this part of their scales, opacities and colors; 0 merges equal ones.
+    pub merge: Option<f32>,
 }
 
 /// Converts a scene to the form and the color degrees of the settings. Levels of detail are dropped, since they were made from the
@@ -43,10 +46,38 @@ pub fn convert(mut scene: GaussianScene, settings: &ConvertSettings) -> Result<G
     }
     let ColorDegrees { degree, degree_t, .. } = scene.form.color_degrees();
     scene.form.truncate_colors(settings.sh_degree.unwrap_or(degree), settings.sh_degree_t.unwrap_or(degree_t));
+    if let Some(tolerance) = settings.merge {
+        merge(&mut scene, tolerance)?;
+    }
     match (settings.form, &scene.form) {
         (Some(TargetForm::Trained), SceneForm::Ready(_)) => Err(OfflineError::NotTrained),
         (Some(TargetForm::Runtime), SceneForm::Trained(_)) => Ok(scene.into_runtime()?.into()),
         _ => Ok(scene),
+    }
+}
+
+/// Merges the Gaussians of consecutive frames that are alike within a tolerance; see [`ConvertSettings::merge`].
+///
+/// # Errors
+/// [`OfflineError::NoFrames`] for a scene whose Gaussians have no windows of time, or that is packed.
+pub fn merge(scene: &mut GaussianScene, tolerance: f32) -> Result<(), OfflineError> {
+    let frames = scene.filter.as_ref().filter(|filter| filter.is_of_capture());
+    let (SceneForm::Ready(Form::Sliced(sliced)), Some(filter)) = (&scene.form, frames) else {
+        return Err(OfflineError::NoFrames);
+    };
+    let (merged, filter) = merge_neighbors(sliced, filter, tolerance).ok_or(OfflineError::NoFrames)?;
+    (scene.form, scene.filter) = (SceneForm::Ready(Form::Sliced(merged)), Some(filter));
+    Ok(())
+}
+
+/// Returns an error if the temporal filter of a scene is part of the capture, so that `what` would change it.
+///
+/// # Errors
+/// [`OfflineError::Windows`].
+pub(crate) fn require_no_windows(filter: Option<&TemporalFilter>, what: &'static str) -> Result<(), OfflineError> {
+    match filter {
+        Some(filter) if filter.is_of_capture() => Err(OfflineError::Windows { what }),
+        _ => Ok(()),
     }
 }
 

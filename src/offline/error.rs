@@ -137,6 +137,19 @@ pub enum OfflineError {
         "holds a sliced form, which cannot be converted to the trained form: convert the checkpoint with --form trained"
     )]
     NotTrained,
+    /// A scene of which no consecutive frames can be merged.
+    #[error(
+        "has no frames to merge: only an unpacked sequence of files, or another capture of separate windows of time, has"
+    )]
+    NoFrames,
+    /// A scene whose temporal filter is part of the capture, which the work would replace or leave out.
+    #[error(
+        "shows each Gaussian only in a window of time of its own (frames, or pieces of paths), which {what} would lose"
+    )]
+    Windows {
+        /// The work.
+        what: &'static str,
+    },
     /// The threads that write pictures cannot be started.
     #[error(transparent)]
     Threads(#[from] rayon::ThreadPoolBuildError),

@@ -11,6 +11,7 @@ pub(crate) mod filter;
 mod form;
 mod gaussian_scene;
 pub mod grow;
+pub(crate) mod merge_neighbors;
 pub(crate) mod packed;
 mod pick;
 pub(crate) mod pieces;

@@ -35,9 +35,14 @@ pub(crate) struct Curve<P> {
     pub mean_t: f32,
     /// Temporal standard deviation, timestamp units; infinite if the Gaussian is present at every time.
     pub sigma_t: f32,
+    /// The times between which it exists, rounded to segments; all of them if they are infinite.
+    pub window: [f32; 2],
     /// The scale that the tolerance is relative to, the middle one of the three; capture units.
     pub scale: f32,
 }
+
+/// A window that contains every time.
+pub(crate) const ALWAYS: [f32; 2] = [f32::NEG_INFINITY, f32::INFINITY];
 
 /// Where a path may bend.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -177,12 +182,18 @@ impl Splitting {
 
     /// Returns the segments in which a Gaussian is visible; `None` if it is visible in none.
     fn visible<P>(&self, curve: &Curve<P>) -> Option<RangeInclusive<u32>> {
-        let last = self.segments - 1;
-        if !curve.sigma_t.is_finite() {
-            return Some(0..=last);
-        }
         let [begin, end] = self.interval.map(f64::from);
         let span = end - begin;
+        let segments = f64::from(self.segments);
+        let position = |time: f64| (time - begin) / span * segments;
+        let [opens, closes] = curve.window.map(|time| position(f64::from(time)).round().clamp(0.0, segments));
+        if opens >= closes {
+            return None;
+        }
+        let (opens, closes) = (opens as u32, closes as u32 - 1);
+        if !curve.sigma_t.is_finite() {
+            return Some(opens..=closes);
+        }
         // A margin covers the rounding of times.
         let reach = (-2.0 * f64::from(self.cutoff).ln()).sqrt() * 1.0001;
         let half = reach * f64::from(curve.sigma_t) + span * 1e-6;
@@ -190,9 +201,9 @@ impl Splitting {
         if mean + half < begin || mean - half > end {
             return None;
         }
-        let segment =
-            |time: f64| ((time - begin) / span * f64::from(self.segments)).floor().clamp(0.0, f64::from(last)) as u32;
-        Some(segment(mean - half)..=segment(mean + half))
+        let segment = |time: f64| position(time).floor().clamp(0.0, segments - 1.0) as u32;
+        let (first, last) = (segment(mean - half).max(opens), segment(mean + half).min(closes));
+        (first <= last).then_some(first..=last)
     }
 
     /// Returns the chord of a path between two boundaries of segments.
@@ -324,7 +335,7 @@ mod tests {
                 let since = time - f64::from(mean_t);
                 coefficients.iter().rev().fold(DVec3::ZERO, |sum, &c| sum * since + DVec3::from(c))
             };
-            let pieces = splitting.split(1, |_| Curve { position, mean_t, sigma_t: sigma, scale });
+            let pieces = splitting.split(1, |_| Curve { position, mean_t, sigma_t: sigma, window: ALWAYS, scale });
             prop_assert!(pieces.filter.check(pieces.pieces.len()).is_ok(), "the filter is that of the pieces");
             prop_assert!(pieces.pieces.len() <= MOST_OF_ONE as usize, "the number of pieces is bounded");
             let allowed = if pieces.coarse == 0 { 0.25 * f64::from(scale) } else { pieces.error };
@@ -359,7 +370,7 @@ mod tests {
                 points[before].lerp(points[before + 1], frame - before as f64)
             };
             let splitting = Splitting { bends: Bends::AtSegments, ..splitting(40, 1e-6) };
-            let pieces = splitting.split(1, |_| Curve { position, mean_t: 0.0, sigma_t: f32::INFINITY, scale: 1.0 });
+            let pieces = splitting.split(1, |_| Curve { position, mean_t: 0.0, sigma_t: f32::INFINITY, window: ALWAYS, scale: 1.0 });
             prop_assert!(pieces.pieces.len() <= bends.len() + 1, "a straight line is one piece");
             prop_assert!(pieces.relative_error <= 1e-6 && pieces.coarse == 0, "key-frames are met");
         }
@@ -375,6 +386,7 @@ mod tests {
             position: move |time: f64| circle(time * index as f64),
             mean_t: 1.0,
             sigma_t: if index == 7 { f32::INFINITY } else { 0.2 },
+            window: ALWAYS,
             scale: 0.1,
         };
         let pieces = splitting(MAX_SEGMENTS, 0.25).split(3000, curve);
@@ -386,7 +398,7 @@ mod tests {
 
     #[test]
     fn a_limit_on_all_pieces_raises_the_tolerance() {
-        let curve = |_| Curve { position: circle, mean_t: 1.0, sigma_t: f32::INFINITY, scale: 0.01 };
+        let curve = |_| Curve { position: circle, mean_t: 1.0, sigma_t: f32::INFINITY, window: ALWAYS, scale: 0.01 };
         let splitting = splitting(MAX_SEGMENTS, 0.25);
         let free = splitting.split_into(100, curve, usize::MAX);
         let limited = splitting.split_into(100, curve, free.pieces.len() - 1);
@@ -398,14 +410,33 @@ mod tests {
 
     #[test]
     fn a_path_outside_the_interval_has_no_piece() {
-        let curve = |_| Curve { position: circle, mean_t: 9.0, sigma_t: 0.1, scale: 0.01 };
+        let curve = |_| Curve { position: circle, mean_t: 9.0, sigma_t: 0.1, window: ALWAYS, scale: 0.01 };
         let pieces = splitting(100, 0.25).split(5, curve);
         assert_eq!((pieces.pieces.len(), pieces.unseen), (0, 5), "nothing to draw");
     }
 
     #[test]
+    fn a_window_limits_when_a_path_is_active() {
+        let windows = [[-1.0, 0.0], [0.0, 1.0], [2.5, 9.0], [5.0, 6.0], [1.001, 1.002]];
+        let curve = |index: usize| {
+            let sigma_t = if index == 0 { 0.1 } else { f32::INFINITY };
+            Curve { position: |_| DVec3::ONE, mean_t: 0.05, sigma_t, window: windows[index], scale: 0.1 }
+        };
+        let pieces = splitting(40, 0.25).split(windows.len(), curve);
+        let ActiveSets::Intervals(intervals) = &pieces.filter.sets else { panic!("intervals") };
+        let ends: Vec<_> = intervals.iter().map(|word| (word & 0xffff, word >> 16)).collect();
+        assert_eq!(
+            ends,
+            [(7, 9), (10, 19), (35, 39)],
+            "segments of a tenth of a unit, the first also within its lifespan"
+        );
+        assert_eq!(pieces.unseen, 2, "windows outside the interval, or shorter than half a segment");
+    }
+
+    #[test]
     fn a_path_that_is_not_finite_ends_in_a_bounded_number_of_pieces() {
-        let curve = |_| Curve { position: |_| DVec3::NAN, mean_t: 1.0, sigma_t: f32::INFINITY, scale: 0.0 };
+        let curve =
+            |_| Curve { position: |_| DVec3::NAN, mean_t: 1.0, sigma_t: f32::INFINITY, window: ALWAYS, scale: 0.0 };
         let pieces = splitting(MAX_SEGMENTS, 0.25).split(1, curve);
         assert!(pieces.pieces.len() <= MOST_OF_ONE as usize, "bounded");
     }

@@ -11,6 +11,8 @@ mod checkpoint_poison;
 mod dataset;
 mod exports;
 mod formats_ply;
+#[cfg(feature = "fourdgs")]
+mod fourdgs;
 mod golden;
 mod gradients;
 mod grow;
@@ -31,6 +33,7 @@ mod score;
 #[cfg(feature = "offline")]
 mod score_formula;
 mod sog;
+mod splatv;
 mod spz_and_gltf;
 mod thin;
 

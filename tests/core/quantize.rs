@@ -252,7 +252,8 @@ fn steps_of_any_size_leave_colors_finite() {
 fn degrees_of_coded_colors_can_be_lowered() {
     let (packed, _) = compress(scene(500, 3, 2), &settings(&[16, 16])).expect("compression succeeds");
     let lowered = |degree, degree_t| {
-        let settings = ConvertSettings { form: None, sh_degree: degree, sh_degree_t: degree_t };
+        let settings =
+            ConvertSettings { form: None, sh_degree: degree, sh_degree_t: degree_t, ..ConvertSettings::default() };
         convert(packed.clone(), &settings).expect("the conversion succeeds")
     };
     assert!(lowered(None, None) == packed, "without options the scene is unchanged");

@@ -167,7 +167,7 @@ mod tests {
         let mut bytes = Vec::new();
         write(columns, &samples::clip(up), &mut bytes).expect("memory");
         let beside = InMemory::default();
-        let source = Source { path: Path::new("a.glb"), bytes: &bytes, beside: &beside };
+        let source = Source { bytes: &bytes, beside: &beside };
         let imported = gltf::read(&source, &ReadOptions::default()).expect("a file");
         assert!(imported.lost.is_empty(), "nothing is lost: {:?}", imported.lost);
         let SceneForm::Trained(Trained { parameters, harmonics }) = imported.scene.form else {

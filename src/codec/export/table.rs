@@ -5,6 +5,7 @@
 
 pub(crate) use super::clip::Clip;
 use super::{gltf, ply, sog, splat, spz, usd};
+use crate::codec::fourdgs;
 use crate::codec::import::columns::Columns;
 use std::io::{self, Write};
 
@@ -69,20 +70,6 @@ pub const EXPORTS: &[Export] = &[
         ],
     },
     Export {
-        id: "sog",
-        name: "a SOG of PlayCanvas (.sog)",
-        extension: "sog",
-        what: What::Instant(sog::write_sog),
-        lost: &[SOG],
-    },
-    Export {
-        id: "sogst",
-        name: "a SOG with motion (.sogst)",
-        extension: "sogst",
-        what: What::Moving(sog::write_sogst),
-        lost: &[SOG, "A .sogst file has 256 times and 256 lifespans; paths stay exact. Its players have no cut-off."],
-    },
-    Export {
         id: "spz",
         name: "an SPZ file, version 3 (.spz)",
         extension: "spz",
@@ -105,6 +92,30 @@ pub const EXPORTS: &[Export] = &[
         extension: "usda",
         what: What::Windowed(usd::write),
         lost: &[],
+    },
+    Export {
+        id: "sog",
+        name: "a SOG of PlayCanvas (.sog)",
+        extension: "sog",
+        what: What::Instant(sog::write_sog),
+        lost: &[SOG],
+    },
+    Export {
+        id: "sogst",
+        name: "a SOG with motion (.sogst)",
+        extension: "sogst",
+        what: What::Moving(sog::write_sogst),
+        lost: &[SOG, "A .sogst file has 256 times and 256 lifespans; paths stay exact. Its players have no cut-off."],
+    },
+    Export {
+        id: "4dgs",
+        name: "a .4dgs file (.4dgs)",
+        extension: "4dgs",
+        what: What::Windowed(fourdgs::write),
+        lost: &[
+            "A .4dgs file has 256 values for each color coefficient, and colors from 0 to 1.",
+            "A .4dgs file does not have the axis that points up.",
+        ],
     },
 ];
 

@@ -282,7 +282,7 @@ mod tests {
     #[test]
     fn a_sequence_of_separate_gaussians_has_only_the_visible_ones_in_each_frame() {
         let count = 40;
-        let intervals = (0..count as u32).map(|index| index / 10 | (index / 10) << 16).collect();
+        let intervals = (0..count as u32).map(|index| (index / 10) | ((index / 10) << 16)).collect();
         let filter =
             TemporalFilter { kind: FilterKind::Interval, segments: 4, count, sets: ActiveSets::Intervals(intervals) };
         let columns = Columns { filter: Some(filter), ..samples::columns(count, 0) };

@@ -14,6 +14,11 @@ const LARGEST: f32 = 40.0;
 /// Removes the Gaussians that cannot be drawn, and returns a sentence about them if there are any. An opacity of exactly 0 or 1 and a scale of exactly
 /// 0, which have no finite logit and logarithm, become the nearest ones that have.
 pub(crate) fn keep_drawable(columns: &mut Columns) -> Option<String> {
+    keep_drawable_and(columns, |_| {})
+}
+
+/// As [`keep_drawable`]; `others` removes the same Gaussians elsewhere, and gets the indices of those that stay.
+pub(crate) fn keep_drawable_and(columns: &mut Columns, others: impl FnOnce(&[usize])) -> Option<String> {
     columns.opacity_logit.par_iter_mut().for_each(|value| {
         if value.is_infinite() {
             *value = logit(if *value > 0.0 { 1.0 } else { 0.0 });
@@ -56,6 +61,7 @@ pub(crate) fn keep_drawable(columns: &mut Columns) -> Option<String> {
     }
     let values = kept.par_iter().flat_map_iter(|&index| columns.harmonics.of(index).iter().copied()).collect();
     columns.harmonics = Harmonics { values, ..columns.harmonics };
+    others(&kept);
     let removed = all - kept.len();
     Some(format!(
         "{removed} of {all} Gaussians have values that cannot be drawn (not finite, or no rotation); they are left out."

@@ -2,8 +2,8 @@
 //!
 //! In: the bytes of a file: a description in JSON, then records of 64 bytes, one for each splat in cubic motion. Out: [`Imported`].
 
-use super::columns::logit;
-use super::cubic::{Cubic, imported};
+use super::columns::{Columns, Motion, coefficient, logit};
+use super::cubic::{Bend, imported, sigma_of_width, spacetime_clip};
 use super::error::ImportError;
 use super::imported::Imported;
 use super::source::Source;
@@ -48,32 +48,36 @@ pub(crate) fn read(source: &Source<'_>, options: &ReadOptions) -> Result<Importe
         if r#type == "splat" {
             // The size counts whole rows of a texture; the last row is often cut after its last splat, and otherwise filled with zeros.
             let records = own.as_chunks::<RECORD>().0;
-            return imported(records.iter().filter_map(splat).collect(), options);
+            let mut columns = Columns::with_capacity(records.len(), 0);
+            let mut bends = Vec::with_capacity(records.len());
+            records.iter().for_each(|record| push(record, &mut columns, &mut bends));
+            let mut lost = Vec::new();
+            let played = spacetime_clip(options, &mut lost);
+            return imported(columns, bends, played, options, lost);
         }
         data = others;
     }
     Err(ImportError::unsupported("it has no part of the type \"splat\": nothing to draw"))
 }
 
-/// Returns the splat of a record; `None` if it has an alpha of 0.
-fn splat(record: &[u8; RECORD]) -> Option<Cubic> {
+/// Appends the splat of a record, unless it has an alpha of 0.
+fn push(record: &[u8; RECORD], columns: &mut Columns, bends: &mut Vec<Bend>) {
     let floats = record.as_chunks::<4>().0;
     let halves = record.as_chunks::<2>().0;
     let [red, green, blue, alpha] = floats[7].map(|byte| f32::from(byte) / 255.0);
+    if alpha == 0.0 {
+        return;
+    }
     let half = |index: usize| f16::from_le_bytes(halves[index]).to_f32();
     let three = |index: usize| [0, 1, 2].map(|lane| half(index + lane));
     let four = |index: usize| [0, 1, 2, 3].map(|lane| half(index + lane));
-    (alpha > 0.0).then(|| Cubic {
-        mean: [0, 1, 2].map(|lane| f32::from_le_bytes(floats[lane])),
-        rotation: four(6),
-        scale: three(10),
-        opacity_logit: logit(alpha),
-        color: [red, green, blue],
-        motion: [three(16), three(19), three(22)],
-        turn: four(26),
-        mean_t: half(30),
-        width: half(31),
-    })
+    columns.mean.push([0, 1, 2].map(|lane| f32::from_le_bytes(floats[lane])));
+    columns.rotation.push(four(6));
+    columns.log_scale.push(three(10).map(f32::ln));
+    columns.opacity_logit.push(logit(alpha));
+    columns.harmonics.values.extend([red, green, blue].map(coefficient));
+    columns.motion.push(Motion { velocity: three(16), mean_t: half(30), sigma_t: sigma_of_width(half(31)) });
+    bends.push(Bend { second: three(19), third: three(22), turn: four(26) });
 }
 
 #[cfg(test)]
@@ -106,7 +110,7 @@ mod tests {
     }
 
     fn read_file(bytes: &[u8], options: &ReadOptions) -> Result<Imported, ImportError> {
-        read(&Source { path: Path::new("a.splatv"), bytes, beside: &InMemory::default() }, options)
+        read(&Source { bytes, beside: &InMemory::default() }, options)
     }
 
     const PARTS: &str = r#"[{"type":"splat","size":4096,"texwidth":4096,"texheight":1,"cameras":[]}]"#;
@@ -176,7 +180,7 @@ mod tests {
         data.splice(..0, record([f32::INFINITY; 9], 0.0, 0.5));
         let found = read_file(&file(PARTS, &data), &ReadOptions::default()).expect("a whole file");
         assert_eq!(found.scene.len(), 1, "a splat whose motion is not finite is left out");
-        assert!(found.lost.iter().any(|lost| lost.starts_with("1 splats")), "and stated: {:?}", found.lost);
+        assert!(found.lost.iter().any(|lost| lost.starts_with("1 of 2 Gaussians")), "and stated: {:?}", found.lost);
     }
 
     #[test]

@@ -4,6 +4,7 @@
 
 use super::settings::BakeSettings;
 use crate::offline::belonging::require_belonging;
+use crate::offline::convert::require_no_windows;
 use crate::offline::dataset::TrainingView;
 use crate::offline::engine::Engine;
 use crate::offline::fine_tune::{FineTuneSettings, TrainingImages};
@@ -48,6 +49,7 @@ impl<'a> Inputs<'a> {
     ) -> Result<Self, OfflineError> {
         let BakeSettings { checkpoint, data, splits: options, .. } = settings;
         let store = Store::beside(&settings.out, ".bake")?;
+        require_no_windows(scene.filter.as_ref(), "a bake")?;
         scene.filter = None;
         scene.levels.clear();
         let splits = Splits::open(data, options, &scene.trained_with, progress)?;

@@ -1,66 +1,41 @@
-//! Arrays of NumPy.
+//! The rows of an array of NumPy.
 //!
 //! In: the bytes of a `.npy` file. Out: its rows of `N` float64 values, or the reason why it has none.
 
-/// The first bytes of an array.
-const MAGIC: &[u8] = b"\x93NUMPY";
+use crate::codec::npy::Array;
 
 /// Returns the rows of a two-dimensional array of little-endian float64 values in C order.
 pub(super) fn rows<const N: usize>(bytes: &[u8]) -> Result<Vec<[f64; N]>, String> {
-    let damaged = || "not a whole .npy file: copy it again".to_owned();
-    let rest = bytes.strip_prefix(MAGIC).ok_or_else(damaged)?;
-    let (&[major, _minor], rest) = rest.split_first_chunk::<2>().ok_or_else(damaged)?;
-    let (length, rest) = if major == 1 {
-        let (length, rest) = rest.split_first_chunk::<2>().ok_or_else(damaged)?;
-        (usize::from(u16::from_le_bytes(*length)), rest)
-    } else {
-        let (length, rest) = rest.split_first_chunk::<4>().ok_or_else(damaged)?;
-        (u32::from_le_bytes(*length) as usize, rest)
-    };
-    let (header, values) = rest.split_at_checked(length).ok_or_else(damaged)?;
-    let header = std::str::from_utf8(header).map_err(|_| damaged())?;
-    let entry = |name: &str| {
-        let (_, after) = header.split_once(&format!("'{name}'"))?;
-        Some(after.trim_start().strip_prefix(':')?.trim_start())
-    };
-    let (order, shape) = (entry("fortran_order").ok_or_else(damaged)?, entry("shape").ok_or_else(damaged)?);
-    if !entry("descr").ok_or_else(damaged)?.starts_with("'<f8'") || !order.starts_with("False") {
+    let array = Array::read(bytes).ok_or("not a whole .npy file: copy it again")?;
+    if array.kind != "<f8" || array.is_fortran {
         return Err(
             "its values must be float64 in C order: save it with numpy.save(path, poses.astype('<f8'))".to_owned()
         );
     }
-    let shape = shape.strip_prefix('(').and_then(|shape| shape.split_once(')')).ok_or_else(damaged)?.0;
-    let shape: Vec<&str> = shape.split(',').map(str::trim).filter(|side| !side.is_empty()).collect();
-    let count = match shape[..] {
-        [rows, columns] if columns.parse::<usize>() == Ok(N) => rows.parse::<usize>().map_err(|_| damaged())?,
-        _ => {
-            return Err(format!(
-                "its shape is ({}), not cameras x {N}",
-                crate::codec::text::printable(&shape.join(", "))
-            ));
-        }
+    let [count, columns] = array.shape[..] else {
+        return Err(format!("its shape is ({}), not cameras x {N}", array.shape_in_words()));
     };
-    if count.checked_mul(8 * N) != Some(values.len()) {
+    if columns != N {
+        return Err(format!("its shape is ({}), not cameras x {N}", array.shape_in_words()));
+    }
+    if !array.is_whole(8) {
         return Err(format!(
             "its header says {count} rows, and it has {} bytes of values: copy it again",
-            values.len()
+            array.values.len()
         ));
     }
     let value = |bytes: &[u8; 8]| f64::from_le_bytes(*bytes);
-    let values: Vec<f64> = values.as_chunks::<8>().0.iter().map(value).collect();
+    let values: Vec<f64> = array.values.as_chunks::<8>().0.iter().map(value).collect();
     Ok(values.as_chunks::<N>().0.to_vec())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::codec::npy::tests::npy;
 
     fn file(header: &str, values: &[f64]) -> Vec<u8> {
-        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
-        bytes.extend((header.len() as u16).to_le_bytes());
-        bytes.extend(header.bytes());
-        bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));
-        bytes
+        npy(header, &values.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<u8>>())
     }
 
     #[test]

@@ -18,6 +18,7 @@ mod looks;
 mod merge;
 mod rotation;
 
+use super::convert::require_no_windows;
 use super::quantize::{CompressSettings, Quality, compress};
 use super::{OfflineError, Progress};
 use crate::renderer::Headless;
@@ -90,7 +91,7 @@ pub struct Detailed {
 /// precision; no level has a temporal filter. Begins the task "levels" and, inside it, tasks for each level.
 ///
 /// # Errors
-/// A scene with an environment map, a scene of which no Gaussian is drawn, a scene that does not fit the GPU, a lost device.
+/// A scene with an environment map or with windows of time, a scene of which no Gaussian is drawn, a scene that does not fit the GPU, a lost device.
 pub fn detail(
     headless: &mut Headless,
     mut scene: GaussianScene,
@@ -100,6 +101,7 @@ pub fn detail(
     if scene.environment.is_some() {
         return Err(OfflineError::Surrounded);
     }
+    require_no_windows(scene.filter.as_ref(), "a level of detail")?;
     scene.levels.clear();
     let full = scene.clone().into_runtime()?;
     let sphere = Sphere::of(&full).ok_or(OfflineError::NothingToOrbit)?;
@@ -176,7 +178,7 @@ impl Maker<'_> {
         let trained = &self.full.trained_with;
         let radius = self.sphere.radius;
         let pixel = 2.0 * f64::from(radius) / f64::from(pixels);
-        let merged = merge(sliced, trained.time_interval, radius, count, pixel);
+        let merged = merge(sliced, trained.time_interval, trained.marginal_cutoff, radius, count, pixel);
         let start = GaussianScene {
             form: SceneForm::Trained(merged),
             environment: None,

@@ -12,10 +12,10 @@ use super::trainer::{StepGrowth, Trainer};
 use crate::offline::dataset::selection::even_subset;
 use crate::offline::metrics::SquaredError;
 use crate::offline::score::GpuEngine;
-use crate::offline::temporal_filter::{needs_views, seen_filter};
+use crate::offline::temporal_filter::seen_filter;
 use crate::offline::{OfflineError, Progress, sliced};
 use crate::renderer::{GpuError, Headless, ShaderChecks};
-use crate::scene::{GaussianScene, RuntimeScene, TemporalFilter};
+use crate::scene::{FilterKind, GaussianScene, RuntimeScene, TemporalFilter, TrainedWith};
 use crate::view::{Background, Frame, View};
 use glam::Vec3;
 
@@ -60,10 +60,11 @@ impl<'a> Run<'a> {
             Some(_) => Background::Environment,
             None => Background::Color(scene.trained_with.background),
         };
-        let (used, support) = scene.filter.take().map_or((None, None), |filter| match needs_views(filter.kind) {
-            true => (Some(filter), None),
-            false => (None, Some(filter.segments)),
-        });
+        let (used, support) =
+            scene.filter.take().map_or((None, None), |filter| match filter.kind != FilterKind::Support {
+                true => (Some(filter), None),
+                false => (None, Some(filter.segments)),
+            });
         scene.filter = used;
         let mut trainer = Trainer::with_sums(headless, scene, settings.mode, settings.sums)?;
         trainer.set_terms(settings.terms)?;
@@ -106,8 +107,9 @@ impl<'a> Run<'a> {
     pub(super) fn scene(&self) -> Result<GaussianScene, OfflineError> {
         let mut scene = self.trainer.scene()?;
         if let Some(segments) = self.support {
-            let interval = scene.trained_with.time_interval;
-            scene.filter = Some(TemporalFilter::support(sliced(&scene)?.iter().copied(), interval, segments));
+            let TrainedWith { time_interval, marginal_cutoff, .. } = scene.trained_with;
+            let gaussians = sliced(&scene)?.into_owned().into_iter();
+            scene.filter = Some(TemporalFilter::support(gaussians, time_interval, marginal_cutoff, segments));
         }
         Ok(scene)
     }

@@ -8,6 +8,7 @@
 mod cameras;
 mod checkpoint;
 mod datasets;
+mod imports;
 mod package;
 mod pictures;
 mod saved;
@@ -55,7 +56,7 @@ pub struct Kind {
 }
 
 /// The readers.
-pub static KINDS: [Kind; 15] = [
+pub static KINDS: [Kind; 21] = [
     Kind {
         name: "package",
         about: "packages (.gs4d) in every form, with filters and environment maps",
@@ -160,5 +161,47 @@ pub static KINDS: [Kind; 15] = [
         extension: "saved",
         share: 10,
         make: || Arc::new(saved::Saved::new()),
+    },
+    Kind {
+        name: "ply",
+        about: "PLY of Gaussians: 3DGS, FreeTimeGS, Spacetime Gaussians, compressed",
+        extension: "ply",
+        share: 1,
+        make: || Arc::new(imports::Imports::new("ply")),
+    },
+    Kind {
+        name: "splat",
+        about: ".splat files",
+        extension: "splat",
+        share: 1,
+        make: || Arc::new(imports::Imports::new("splat")),
+    },
+    Kind {
+        name: "splatv",
+        about: "captures of splaTV",
+        extension: "splatv",
+        share: 1,
+        make: || Arc::new(imports::Imports::new("splatv")),
+    },
+    Kind {
+        name: "npz",
+        about: "parameters of Dynamic 3D Gaussians",
+        extension: "npz",
+        share: 1,
+        make: || Arc::new(imports::Imports::new("npz")),
+    },
+    Kind {
+        name: "4dgs",
+        about: ".4dgs files",
+        extension: "4dgs",
+        share: 1,
+        make: || Arc::new(imports::Imports::new("4dgs")),
+    },
+    Kind {
+        name: "sog",
+        about: "SOG and .sogst",
+        extension: "sog",
+        share: 1,
+        make: || Arc::new(imports::Imports::new("sog")),
     },
 ];

@@ -15,7 +15,6 @@ use crate::scene::{Form, GaussianScene, SceneForm, Sliced, UpAxis};
 use glam::Vec3;
 use serde_json::Value;
 use std::io::{Cursor, Read};
-use std::path::Path;
 use zip::ZipArchive;
 
 /// Gaussians in three clumps, most of them short, one in 50 at rest and always there.
@@ -66,7 +65,7 @@ pub(super) fn written(id: &str, columns: &Columns) -> Vec<u8> {
 }
 
 pub(super) fn read(bytes: &[u8]) -> Result<Imported, String> {
-    let source = Source { path: Path::new("a.sogst"), bytes, beside: &InMemory::default() };
+    let source = Source { bytes, beside: &InMemory::default() };
     sog::read(&source, &ReadOptions::default()).map_err(|error| error.to_string())
 }
 

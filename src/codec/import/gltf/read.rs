@@ -212,7 +212,7 @@ mod tests {
     }
 
     fn imported(file: &[u8], beside: &InMemory) -> Result<Imported, ImportError> {
-        read(&Source { path: Path::new("a.glb"), bytes: file, beside }, &ReadOptions::default())
+        read(&Source { bytes: file, beside }, &ReadOptions::default())
     }
 
     /// Reads the document after a change.

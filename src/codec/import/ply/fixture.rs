@@ -92,7 +92,7 @@ impl File {
 
 /// Reads a file from memory.
 pub(crate) fn read_bytes(bytes: &[u8], options: &ReadOptions) -> Result<Imported, ImportError> {
-    read(&Source { path: Path::new("test.ply"), bytes, beside: &InMemory::default() }, options)
+    read(&Source { bytes, beside: &InMemory::default() }, options)
 }
 
 /// Returns the message about a file that is refused.

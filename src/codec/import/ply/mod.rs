@@ -1,7 +1,7 @@
 //! PLY files of Gaussians.
 //!
 //! In: the bytes of a file. Out: its scene. `header` and `body` read PLY as such, into a [`Table`] for each element; `layout` recognizes the trainer or
-//! tool by the names of the properties; `splats`, `compressed`, `moving` and `rotated` read one layout each, or some that differ in names alone.
+//! tool by the names of the properties; `splats`, `compressed`, `moving`, `spacetime` and `rotated` read one layout each, or some that differ in names alone.
 
 mod body;
 mod compressed;
@@ -11,6 +11,7 @@ mod moving;
 mod read;
 mod rotated;
 mod scalar;
+mod spacetime;
 mod splats;
 pub(crate) mod table;
 

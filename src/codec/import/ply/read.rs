@@ -6,8 +6,9 @@ use super::body::tables;
 use super::header::{Comments, Header};
 use super::layout::Layout;
 use super::table::Table;
-use super::{compressed, moving, rotated, splats};
+use super::{compressed, moving, rotated, spacetime, splats};
 use crate::codec::import::columns::{Columns, Played};
+use crate::codec::import::cubic;
 use crate::codec::import::drawable::keep_drawable;
 use crate::codec::import::error::ImportError;
 use crate::codec::import::imported::Imported;
@@ -36,9 +37,16 @@ pub(crate) fn read(source: &Source<'_>, options: &ReadOptions) -> Result<Importe
         Layout::Sogst => moving::sogst(vertex, comments, options, &mut lost)?,
         Layout::Sog4d => moving::sog4d(vertex, comments)?,
         Layout::Splats | Layout::Compressed | Layout::Rotated => (Vec::new(), Played::still(UpAxis::NegY)),
-        Layout::SogstCurved | Layout::Spacetime => return Err(curved(layout)),
+        Layout::SogstCurved => moving::sogst(vertex, comments, options, &mut lost)?,
+        Layout::Spacetime => spacetime::lifespans(vertex, options, &mut lost)?,
     };
     columns.motion = motion;
+    if let Some(bends) = spacetime::bends(layout, vertex)? {
+        if layout == Layout::Spacetime {
+            spacetime::decode_colors(&mut columns);
+        }
+        return cubic::imported(columns, bends, played, options, lost);
+    }
     lost.extend(keep_drawable(&mut columns));
     Ok(Imported { scene: columns.into_scene(played, options)?, lost })
 }
@@ -90,14 +98,4 @@ fn native(vertex: &Table<'_>, options: &ReadOptions) -> Result<Imported, ImportE
     let mut scene = played.scene(SceneForm::Trained(trained), None, options)?;
     scene.trained_with.rotation_convention = convention;
     Ok(Imported { scene, lost: Vec::new() })
-}
-
-/// Returns the error about paths that are not straight.
-fn curved(layout: Layout) -> ImportError {
-    let what = if layout == Layout::Spacetime {
-        "Spacetime Gaussians, on cubic paths"
-    } else {
-        "Gaussians with an acceleration"
-    };
-    ImportError::unsupported(format!("holds {what}, which are not read from PLY"))
 }

@@ -109,8 +109,8 @@ pub(super) fn columns(files: &mut Files, meta: &Value, ranges: Option<&[Range<us
     let encoded = textures::read(files, layout.names())?;
     let count = textures::check_count(count, &encoded)?;
     let textures = textures::decode(&encoded, count)?;
-    let whole = [0..count];
-    let ranges = ranges.unwrap_or(&whole);
+    let whole = 0..count;
+    let ranges = ranges.unwrap_or(std::slice::from_ref(&whole));
     let wanted: usize = ranges.iter().map(Range::len).sum();
     if wanted > count || ranges.iter().any(|range| range.end > count) {
         return Err(ImportError::damaged(format!("it has {count} Gaussians, fewer than lod-meta.json states")));

@@ -13,7 +13,7 @@ use crate::codec::import::in_pieces::{in_pieces, middle_scale, splitting, statem
 use crate::codec::import::{ImportError, Imported};
 use crate::codec::options::ReadOptions;
 use crate::gaussian::{Harmonics, SMALLEST_CUTOFF};
-use crate::scene::pieces::{Bends, Curve};
+use crate::scene::pieces::{ALWAYS, Bends, Curve};
 use crate::scene::{MAX_SEGMENTS, TrainedCameras};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -285,7 +285,7 @@ fn straight(
             let since = time - f64::from(mean_t);
             mean + (velocity + accel * since) * since
         };
-        Curve { position, mean_t, sigma_t, scale: middle_scale(columns.log_scale[index]) }
+        Curve { position, mean_t, sigma_t, window: ALWAYS, scale: middle_scale(columns.log_scale[index]) }
     });
     lost.extend(statements(&pieces, columns.len(), splitting.tolerance));
     Ok(in_pieces(columns, &sigma_t, pieces, |piece| columns.rotation[piece.source as usize]))

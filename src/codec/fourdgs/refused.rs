@@ -1,0 +1,30 @@
+//! The functions of a build without the feature `fourdgs`.
+//!
+//! In: a file. Out: an error with the line that builds a command with the feature.
+
+use crate::codec::export::table::Clip;
+use crate::codec::import::columns::Columns;
+use crate::codec::import::source::Source;
+use crate::codec::import::{ImportError, Imported};
+use crate::codec::options::ReadOptions;
+use std::io::{self, Write};
+
+/// Refuses a file.
+///
+/// # Errors
+/// Always.
+pub(crate) fn read(_: &Source<'_>, _: &ReadOptions) -> Result<Imported, ImportError> {
+    Err(ImportError::unsupported(
+        "a .4dgs file, which this build does not read: build with `--features fourdgs`, or convert it with the command gs4d",
+    ))
+}
+
+/// Refuses to write a file.
+///
+/// # Errors
+/// Always.
+pub(crate) fn write(_: &Columns, _: &Clip, _: &mut dyn Write) -> io::Result<()> {
+    Err(io::Error::other(
+        "this build does not write .4dgs files: build with `--features fourdgs`, or use the command gs4d",
+    ))
+}
