@@ -41,7 +41,7 @@ pub(crate) type Writer = fn(&Columns, &Clip, &mut dyn Write) -> io::Result<()>;
 
 /// What all formats of the SOG family lose.
 const SOG: &str = "Scales and colors have 256 values, rotations 256 for each component, and at most 65,536 sets of coefficients above degree 0 are \
-                   kept; players take -Y as the axis that points up.";
+                   kept.";
 
 /// All formats.
 pub const EXPORTS: &[Export] = &[

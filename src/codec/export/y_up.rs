@@ -1,4 +1,4 @@
-//! Gaussians for formats whose up is +Y.
+//! Gaussians for formats whose up is +Y or -Y.
 //!
 //! In: [`Columns`] and the axis that points up. Out: the columns, rotated with their colors.
 
@@ -9,16 +9,34 @@ use glam::{DAffine3, DMat3, DVec3};
 use std::borrow::Cow;
 use std::io;
 
+/// From +Y to -Y, around the x-axis.
+const HALF_TURN: DAffine3 = DAffine3 {
+    matrix3: DMat3 { x_axis: DVec3::X, y_axis: DVec3::NEG_Y, z_axis: DVec3::NEG_Z },
+    translation: DVec3::ZERO,
+};
+
 /// Returns the columns in a space in which +Y points up.
 ///
 /// # Errors
 /// None: a rotation is always possible.
 pub(super) fn y_up(columns: &Columns, up: UpAxis) -> io::Result<Cow<'_, Columns>> {
-    if up == UpAxis::PosY {
+    turned(columns, &rotation(up))
+}
+
+/// Returns the columns in a space in which -Y points up.
+///
+/// # Errors
+/// None: a rotation is always possible.
+pub(super) fn y_down(columns: &Columns, up: UpAxis) -> io::Result<Cow<'_, Columns>> {
+    turned(columns, &(HALF_TURN * rotation(up)))
+}
+
+fn turned<'c>(columns: &'c Columns, map: &DAffine3) -> io::Result<Cow<'c, Columns>> {
+    if *map == DAffine3::IDENTITY {
         return Ok(Cow::Borrowed(columns));
     }
     let mut turned = columns.clone();
-    place(&mut turned, &rotation(up)).map_err(io::Error::other)?;
+    place(&mut turned, map).map_err(io::Error::other)?;
     Ok(Cow::Owned(turned))
 }
 
@@ -47,6 +65,8 @@ mod tests {
             let map = rotation(up);
             let to = map.transform_vector3(up.vector().as_dvec3());
             assert_eq!((to, map.matrix3.determinant()), (DVec3::Y, 1.0), "{up:?} is rotated to +Y");
+            let down = HALF_TURN * map;
+            assert_eq!(down.transform_vector3(up.vector().as_dvec3()), DVec3::NEG_Y, "{up:?} is rotated to -Y");
         }
     }
 }
