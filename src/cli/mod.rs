@@ -18,6 +18,7 @@ mod detail;
 mod eval;
 mod failure;
 mod fine_tune;
+mod fleet;
 mod info;
 mod info_dataset;
 mod interrupt;
@@ -85,6 +86,8 @@ enum Verb {
     #[command(name = "finetune")]
     FineTune(fine_tune::FineTune),
     Bake(bake::Bake),
+    #[command(name = "report")]
+    Fleet(fleet::Fleet),
 }
 
 impl Verb {
@@ -106,6 +109,7 @@ impl Verb {
             Self::Train(verb) => verb.run(),
             Self::FineTune(verb) => verb.run(),
             Self::Bake(verb) => verb.run(),
+            Self::Fleet(verb) => verb.run(),
         }
     }
 }

@@ -14,6 +14,7 @@ mod eval;
 #[cfg(target_os = "linux")]
 mod faults;
 mod fine_tune;
+mod fleet;
 #[cfg(target_os = "linux")]
 mod kills;
 mod options;
