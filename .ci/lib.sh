@@ -12,6 +12,8 @@ exec </dev/null
 # The features that can be built separately, without and with Bevy. `default` implies `bevy`; `openxr` is not tested.
 without_bevy=(renderer offline cli)
 with_bevy=(bevy pbr picking testing inspector viewer)
+# Those that need many further crates: only .ci/full builds them.
+of_full=(storage)
 # The features that all tests, examples and documents together need.
 everything=viewer,cli
 

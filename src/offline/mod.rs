@@ -25,6 +25,7 @@
 //! | `shaders`, `layout` | compose the passes of scoring and training, and mirror their structures |
 //! | `files` | refuses outputs that are inputs or cannot be written, before anything is computed |
 //! | `stages`, `store`, `stored` | run stages and keep their results, from which interrupted work resumes |
+//! | `names` | the names of files that are copies of files elsewhere |
 //! | `unfinished` | lists the files and folders that are removed if a process ends before its work |
 //! | [`orbit`], `render` | draws a scene from all sides, many pictures at a time |
 
@@ -45,6 +46,7 @@ pub(crate) mod fleet;
 pub(crate) mod layout;
 pub(crate) mod memory_check;
 pub mod metrics;
+pub(crate) mod names;
 pub mod orbit;
 mod package_size;
 pub(crate) mod picture_file;
@@ -66,7 +68,7 @@ pub(crate) mod store;
 pub(crate) mod stored;
 mod subject;
 pub(crate) mod temporal_filter;
-mod temporary_file;
+pub(crate) mod temporary_file;
 mod test_comparison;
 pub(crate) mod train;
 mod trained_pixel;

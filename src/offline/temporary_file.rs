@@ -14,7 +14,7 @@ const PREFIX: &str = ".gs4d-";
 const SUFFIX: &str = ".part";
 
 /// A temporary file. It is removed when it is dropped, and when the process ends, unless it has replaced its output.
-pub(super) struct Part {
+pub(crate) struct Part {
     /// The open file.
     pub file: File,
     path: PathBuf,
@@ -37,7 +37,7 @@ impl Drop for Part {
 ///
 /// # Errors
 /// A folder that cannot be written to.
-pub(super) fn create(target: PathBuf) -> io::Result<Part> {
+pub(crate) fn create(target: PathBuf) -> io::Result<Part> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(PREFIX).suffix(SUFFIX);
     #[cfg(unix)]
@@ -88,8 +88,24 @@ pub(super) fn replace(mut parts: Vec<(Part, PathBuf)>) -> Result<(), CodecError>
     Ok(())
 }
 
+/// Replaces `target` by a complete file that is no output of the work, such as a copy of an input.
+///
+/// # Errors
+/// The file cannot be renamed.
+pub(crate) fn place(mut part: Part) -> io::Result<()> {
+    let mut unfinished = unfinished::lock();
+    let placed = fs::rename(&part.path, &part.target);
+    if placed.is_ok() {
+        part.has_replaced = true;
+        unfinished.take_file(&part.path);
+    }
+    // Unlocked before the part is dropped.
+    drop(unfinished);
+    placed
+}
+
 /// Removes the temporary files of killed runs. Files that cannot be opened are kept.
-pub(super) fn remove_stale(folder: &Path) {
+pub(crate) fn remove_stale(folder: &Path) {
     let Ok(entries) = fs::read_dir(folder) else { return };
     for path in entries.flatten().map(|entry| entry.path()).filter(|path| is_part(path)) {
         // The lock is held until the file is removed, so that no other run begins to write to it.
@@ -108,7 +124,7 @@ fn is_part(path: &Path) -> bool {
 }
 
 /// Returns the folder of a file: the current folder for a name alone.
-pub(super) fn folder_of(path: &Path) -> &Path {
+pub(crate) fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 

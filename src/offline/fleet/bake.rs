@@ -98,7 +98,8 @@ impl Bake {
         let skipped = report.stages.iter().filter(|stage| stage.skipped).count();
         figures.reported = Some(Reported::of(report));
         if skipped > 0 {
-            self.note(&format!("was resumed: its time is without {skipped} stages of an earlier run"));
+            let stages = if skipped == 1 { "a stage".to_owned() } else { format!("{skipped} stages") };
+            self.note(&format!("was resumed: its time is without {stages} of an earlier run"));
         }
     }
 

@@ -3,6 +3,7 @@
 //! In: paths of files and folders. Out: the paths of packages, those of unfinished bakes included, each once.
 
 use crate::offline::OfflineError;
+use crate::offline::store::WORK_ENDINGS;
 use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -13,8 +14,6 @@ const PACKAGE: &str = ".gs4d";
 const TRAINED: &str = ".trained.gs4d";
 /// The ending that a bake adds to the name of its package for the folder of its intermediate results.
 pub(super) const WORK: &str = ".bake";
-/// The endings of folders that have intermediate results.
-const WORK_FOLDERS: [&str; 2] = [WORK, ".tune"];
 
 /// Returns the packages that paths name, in their order. A file is taken as it is, whether it exists or not. A folder stands for the packages
 /// in it and in its folders, sorted by name, and for the packages that unfinished bakes there were to write; trained captures
@@ -43,7 +42,7 @@ fn in_folder(folder: &Path) -> Result<Vec<PathBuf>, OfflineError> {
             if name.starts_with('.') {
             } else if !is_folder {
                 found.extend((name.ends_with(PACKAGE) && !name.ends_with(TRAINED)).then_some(path));
-            } else if !WORK_FOLDERS.iter().any(|ending| name.ends_with(ending)) {
+            } else if !WORK_ENDINGS.iter().any(|ending| name.ends_with(ending)) {
                 folders.push(path);
             } else if name.ends_with(WORK) && name.trim_end_matches(WORK).ends_with(PACKAGE) {
                 let package = path.with_extension("");

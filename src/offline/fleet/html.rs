@@ -8,6 +8,7 @@ use super::fleet_report::FleetReport;
 use super::measure::{MEASURES, Measure};
 use super::outliers::{FEWEST, LIMIT, Outlier};
 use super::strip::{Dot, strip};
+use crate::offline::names;
 use crate::offline::report::escape::escape;
 use std::path::{Component, Path, PathBuf};
 
@@ -44,7 +45,7 @@ impl FleetReport {
             tile("packages", &self.bakes.len().to_string(), ""),
             tile("failed", &failed.to_string(), if failed > 0 { "bad" } else { "" }),
             tile("with outliers", &unusual.to_string(), if unusual > 0 { "far" } else { "" }),
-            tile("of packages", &size(bytes), ""),
+            tile("all packages", &size(bytes), ""),
             tile("Gaussians", &grouped(gaussians), ""),
             tile("of baking", &duration(seconds), ""),
         ];
@@ -56,9 +57,10 @@ impl FleetReport {
 
     /// Returns the distributions of all measures.
     fn strips(&self) -> String {
-        let names: Vec<String> = self.bakes.iter().map(|bake| bake.package.display().to_string()).collect();
+        let shown: Vec<String> =
+            self.bakes.iter().map(|bake| names::shown(&bake.package.display().to_string())).collect();
         let card = |(measure, usual): (&Measure, &Option<_>)| {
-            let bakes = self.bakes.iter().zip(&names).enumerate();
+            let bakes = self.bakes.iter().zip(&shown).enumerate();
             let dots: Vec<Dot> =
                 bakes.filter_map(|(row, (bake, name))| Some(Dot { row, name, value: measure.of(bake)? })).collect();
             match strip(measure, usual.as_ref(), &dots) {
@@ -77,7 +79,11 @@ impl FleetReport {
 
     fn failures_card(&self) -> String {
         let line = |(bake, failure): (&Bake, &str)| {
-            format!("<li><b>{}</b> {}</li>", escape(&bake.package.display().to_string()), escape(failure))
+            format!(
+                "<li><b>{}</b> {}</li>",
+                escape(&names::shown(&bake.package.display().to_string())),
+                escape(failure)
+            )
         };
         match self.failures().map(line).collect::<String>() {
             lines if lines.is_empty() => lines,
@@ -143,7 +149,7 @@ fn cell(measure: &Measure, value: Option<f64>, outlier: Option<&Outlier>) -> Str
 
 /// Returns the name of a package, with links to the package and to its own page.
 fn name(bake: &Bake, page: &Path) -> String {
-    let shown = escape(&bake.package.display().to_string());
+    let shown = escape(&names::shown(&bake.package.display().to_string()));
     let target = bake.page.as_ref().unwrap_or(&bake.package);
     match link(page, target) {
         Some(link) if target.exists() => format!("<a href=\"{}\">{shown}</a>", escape(&link)),
@@ -168,8 +174,10 @@ fn remarks(bake: &Bake, outliers: &[Outlier]) -> String {
 /// Returns the link from a page to a file, relative to the page; `None` if there is no relative path, as between two drives.
 fn link(page: &Path, file: &Path) -> Option<String> {
     let folder = page.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let [from, to] = [folder, file].map(|path| path.canonicalize().or_else(|_| std::path::absolute(path)));
-    let (from, to) = (from.ok()?, to.ok()?);
+    let resolved = |path: &Path| path.canonicalize().or_else(|_| std::path::absolute(path)).ok();
+    // Copies are linked by the names of their origins.
+    let place = |path: &Path| Some(PathBuf::from(names::shown(&resolved(path)?.display().to_string())));
+    let (from, to) = (place(folder)?, place(file)?);
     let shared = from.components().zip(to.components()).take_while(|(a, b)| a == b).count();
     if shared == 0 {
         return None;
