@@ -35,21 +35,20 @@ mod synth;
 mod system;
 mod table;
 mod train;
-mod urls;
+pub(crate) mod urls;
 mod usage;
 
-use crate::offline::unfinished;
+use crate::offline::{names, unfinished};
 use clap::{Parser, Subcommand};
 use failure::Failure;
 use note::note;
 use places::ThisMachine;
-pub(crate) use places::{PlaceError, Places};
+pub(crate) use places::{Opened, PlaceError, Places};
 use report::Report;
 use std::env;
 use std::ffi::OsString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
-pub(crate) use urls::{replaced, urls};
 
 /// The exit code of a verb that fails, and of a command line that cannot be understood.
 const FAILED: u8 = 2;
@@ -138,11 +137,12 @@ pub(crate) fn run_in(places: &mut dyn Places) -> ExitCode {
     let (report, failed) = report_of(|| {
         interrupt::install(cli.json)?;
         let failure = |error: PlaceError| Failure::new(error.to_string());
-        let placed = places.open(arguments, &values, &note).map_err(failure)?;
-        let report = Cli::try_parse_from(placed)?.verb.run()?;
-        if !report.interrupted {
-            places.close(&note).map_err(failure)?;
-        }
+        let Opened { arguments, names } = places.open(arguments, &values, &note).map_err(failure)?;
+        names.iter().for_each(|(copies, origin)| names::show(copies, origin));
+        let report = Cli::try_parse_from(arguments)?.verb.run()?;
+        // The results of interrupted work are brought to their place, too.
+        let _deferred = interrupt::defer();
+        places.close(&note).map_err(failure)?;
         Ok(report)
     });
     interrupt::begin_report();

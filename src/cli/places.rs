@@ -11,9 +11,17 @@ use std::ffi::OsString;
 /// An error of a place. Its message names the file.
 pub(crate) type PlaceError = Box<dyn Error + Send + Sync>;
 
+/// A command line on the files of this machine.
+pub(crate) struct Opened {
+    /// The arguments.
+    pub arguments: Vec<OsString>,
+    /// Folders of this machine that have copies, each with the place that its files are shown by.
+    pub names: Vec<(String, String)>,
+}
+
 /// Where the files of the command are.
 pub(crate) trait Places {
-    /// Returns the arguments with paths in place of other names of files, once what the verb reads is there. `note` shows a line to the
+    /// Returns the command line with paths in place of other names of files, once what the verb reads is there. `note` shows a line to the
     /// user.
     ///
     /// # Errors
@@ -23,7 +31,7 @@ pub(crate) trait Places {
         arguments: Vec<OsString>,
         values: &ArgMatches,
         note: &dyn Fn(&str),
-    ) -> Result<Vec<OsString>, PlaceError>;
+    ) -> Result<Opened, PlaceError>;
 
     /// Brings what the verb has written to its place.
     ///
@@ -41,7 +49,7 @@ impl Places for ThisMachine {
         arguments: Vec<OsString>,
         values: &ArgMatches,
         _note: &dyn Fn(&str),
-    ) -> Result<Vec<OsString>, PlaceError> {
+    ) -> Result<Opened, PlaceError> {
         match urls(values)?.first() {
             Some(named) => Err(format!(
                 "{}: URLs are read and written by a gs4d that was built with the feature storage: cargo install bevy_gs4d \
@@ -49,7 +57,7 @@ impl Places for ThisMachine {
                 named.url
             )
             .into()),
-            None => Ok(arguments),
+            None => Ok(Opened { arguments, names: Vec::new() }),
         }
     }
 

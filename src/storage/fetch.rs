@@ -5,6 +5,7 @@
 
 use super::listing::Listed;
 use super::store_error::StoreError;
+use crate::codec::CodecErrorKind;
 use crate::offline::temporary_file;
 use futures_util::{StreamExt, TryStreamExt, stream};
 use object_store::{Error, GetOptions, GetRange, ObjectStoreExt};
@@ -29,6 +30,8 @@ pub(super) enum FetchError {
     Store(Error),
     /// The disk.
     Disk(io::Error),
+    /// The disk, when the file was complete.
+    Place(CodecErrorKind),
 }
 
 impl From<io::Error> for FetchError {
@@ -51,11 +54,12 @@ pub(super) async fn fetch(object: &Listed, path: &Path) -> Result<(), StoreError
             other => other?,
         }
         part.file.sync_all()?;
-        Ok(temporary_file::place(part)?)
+        temporary_file::replace(vec![(part, path.to_owned())], false).map_err(|error| FetchError::Place(error.kind))
     };
     fetched.await.map_err(|error: FetchError| match error {
         FetchError::Store(error) => StoreError::of(url, &error),
         FetchError::Disk(error) => StoreError::new(url, format!("its copy cannot be written: {error}")),
+        FetchError::Place(error) => StoreError::new(url, format!("its copy cannot be written: {error}")),
     })
 }
 

@@ -9,6 +9,7 @@
 //!
 //! | file | content |
 //! |---|---|
+//! | `arguments.rs` | paths in place of URLs in a command line |
 //! | `place.rs` | a URL: its store, its path there |
 //! | `store_error.rs` | errors of stores as sentences |
 //! | `cache.rs` | the folder of copies |
@@ -17,6 +18,7 @@
 //! | `upload.rs` | from files to objects, each whole |
 //! | `remote.rs` | the command on URLs |
 
+mod arguments;
 mod cache;
 mod fetch;
 mod listing;

@@ -3,14 +3,16 @@
 //! In: the command line of the process. Out: the exit code. URLs of inputs are fetched, and those of outputs written, around the verb, which
 //! works on paths.
 
+use super::arguments::replaced;
 use super::cache::{Cache, Staging};
 use super::fetch::fetch;
 use super::listing::{Listed, list};
 use super::place::{Place, Target};
 use super::store_error::StoreError;
 use super::upload::upload;
-use crate::cli::{PlaceError, Places, replaced, run_in, urls};
-use crate::offline::{names, temporary_file};
+use crate::cli::urls::urls;
+use crate::cli::{Opened, PlaceError, Places, run_in};
+use crate::offline::temporary_file;
 use clap::ArgMatches;
 use futures_util::{StreamExt, TryStreamExt, stream};
 use std::ffi::OsString;
@@ -45,23 +47,25 @@ impl Places for Remote {
         arguments: Vec<OsString>,
         values: &ArgMatches,
         note: &dyn Fn(&str),
-    ) -> Result<Vec<OsString>, PlaceError> {
-        let mut arguments = arguments;
+    ) -> Result<Opened, PlaceError> {
+        let (mut arguments, mut names) = (arguments, Vec::new());
         for named in urls(values)? {
             let path = match Target::of(&named.url)? {
                 Target::Local(path) => path,
                 Target::Remote(place) => {
                     let cache = Cache::of_user()?;
-                    match named.is_output {
-                        true => self.stage(&cache, place)?,
+                    let folder = match named.is_output {
+                        true => self.stage(&cache, &place)?,
                         false => block_on(fetched(&cache, &place, note))??,
-                    }
+                    };
+                    names.push((folder.display().to_string(), place.parent().to_owned()));
+                    folder.join(place.name())
                 }
             };
             let path = path.to_str().ok_or_else(|| format!("{}: its path here is not Unicode", named.url))?;
             arguments = replaced(&arguments, &named.url, path);
         }
-        Ok(arguments)
+        Ok(Opened { arguments, names })
     }
 
     fn close(&mut self, note: &dyn Fn(&str)) -> Result<(), PlaceError> {
@@ -80,17 +84,16 @@ impl Places for Remote {
 }
 
 impl Remote {
-    /// Returns the path that a verb writes to in place of a URL.
-    fn stage(&mut self, cache: &Cache, place: Place) -> Result<PathBuf, StoreError> {
+    /// Returns the folder that a verb writes to in place of the URL of a folder.
+    fn stage(&mut self, cache: &Cache, place: &Place) -> Result<PathBuf, StoreError> {
         let staging = cache.staging(&place.url).map_err(|error| StoreError::new(&place.url, error))?;
-        let path = staging.folder.join(place.name());
-        names::show(&staging.folder.display().to_string(), place.parent());
-        self.outputs.push(Output { place, staging });
-        Ok(path)
+        let folder = staging.folder.clone();
+        self.outputs.push(Output { place: place.clone(), staging });
+        Ok(folder)
     }
 }
 
-/// Returns the path of a copy of what a URL stands for.
+/// Returns the folder with a copy of what a URL stands for.
 async fn fetched(cache: &Cache, place: &Place, note: &dyn Fn(&str)) -> Result<PathBuf, StoreError> {
     let unwritable = |error| {
         let folder = cache.folder().display();
@@ -108,9 +111,7 @@ async fn fetched(cache: &Cache, place: &Place, note: &dyn Fn(&str)) -> Result<Pa
     }
     let files: Vec<_> =
         listed.into_iter().map(|object| object.relative).zip(copies.into_iter().map(|(path, _)| path)).collect();
-    let folder = cache.set(&files).map_err(unwritable)?;
-    names::show(&folder.display().to_string(), place.parent());
-    Ok(folder.join(place.name()))
+    cache.set(&files).map_err(unwritable)
 }
 
 /// Returns the path of a copy of an object, and the bytes that were fetched for it.
