@@ -22,12 +22,12 @@ use tempfile::TempDir;
 struct Game(TempDir);
 
 impl Game {
-    /// Returns a game with the checkpoint `tiny.pth`, which was trained over two seconds.
+    /// Returns a game with the checkpoint `tiny.pth`, which was trained over white.
     fn new() -> Self {
         let game = Self(tempfile::tempdir().expect("a temporary folder"));
         fs::create_dir(game.path("assets")).expect("the folder can be written to");
         fs::write(game.path("assets/tiny.pth"), Pth::rotating(40, 48).bytes()).expect("the folder can be written to");
-        fs::write(game.path("assets/cfg_args"), "Namespace(time_duration=[0.0, 2.0])").expect("written");
+        fs::write(game.path("assets/cfg_args"), "Namespace(white_background=True)").expect("written");
         game
     }
 
@@ -91,7 +91,7 @@ fn a_checkpoint_is_loaded_as_the_package_that_it_was_processed_to() {
     let (header, written) = game.processed();
     assert!(matches!(header.form, StoredForm::Packed { .. }), "packed, unless a .meta file says otherwise");
     assert_eq!((scene.len(), scene.filter.as_ref().map(|filter| filter.segments)), (40, Some(10)), "with a filter");
-    assert_eq!(scene.trained_with.time_interval, [0.0, 2.0], "cfg_args beside the checkpoint is read");
+    assert_eq!(scene.trained_with.background, [1.0; 3], "cfg_args beside the checkpoint is read");
     game.play();
     assert_eq!(game.processed().1, written, "a checkpoint that has not changed is not processed again");
 }
@@ -99,6 +99,7 @@ fn a_checkpoint_is_loaded_as_the_package_that_it_was_processed_to() {
 #[test]
 fn a_changed_meta_file_processes_the_checkpoint_again() {
     let game = Game::new();
+    fs::remove_file(game.path("assets/cfg_args")).expect("the file exists");
     game.set("form: Runtime, segments: None, sh_degree: 1");
     let scene = game.play();
     let (header, _) = game.processed();
