@@ -3,6 +3,7 @@
 #
 # CARGO_TARGET_DIR  build folder; default: a folder of the user's cache, outside the clone, which the next run uses again
 # GS4D_DATA         folder of the trained captures; default: ../shared/data if it exists, else the tests that need captures are skipped
+# GS4D_MOTO         an interpreter of Python with the package moto, for tests of object storage; default: .ci/full makes one
 #
 # Tests add a line for each skipped test to the file that GS4D_SKIPPED names, which is set here; the summary counts these lines.
 set -euo pipefail
@@ -12,6 +13,8 @@ exec </dev/null
 # The features that can be built separately, without and with Bevy. `default` implies `bevy`; `openxr` is not tested.
 without_bevy=(renderer offline cli)
 with_bevy=(bevy pbr picking testing inspector viewer)
+# Those that need many further crates: only .ci/full builds them.
+of_full=(storage)
 # The features that all tests, examples and documents together need.
 everything=viewer,cli
 

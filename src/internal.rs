@@ -54,6 +54,10 @@ pub mod scene {
     pub mod packed {
         pub use crate::scene::packed::*;
 
+        /// The order of Gaussians in packages.
+        pub mod order {
+            pub use crate::scene::packed::order::*;
+        }
         /// Encoding.
         pub mod encode {
             pub use crate::scene::packed::encode::*;
@@ -223,10 +227,6 @@ pub mod offline {
         /// Codebooks.
         pub mod codebook {
             pub use crate::offline::quantize::codebook::*;
-        }
-        /// The order of Gaussians in packages.
-        pub mod order {
-            pub use crate::offline::quantize::order::*;
         }
     }
     /// Scores.

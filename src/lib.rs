@@ -83,7 +83,7 @@
 //! and fails on one that points outwards.
 //!
 //! ```text
-//!                          ┌──▶ codec ───────┐                ┌──▶ offline ──▶ cli
+//!                          ┌──▶ codec ───────┐                ┌──▶ offline ──▶ cli ──▶ storage
 //! view ─▶ gaussian ─▶ scene                  ├──▶ renderer ───┤
 //!                          └──▶ reference ───┘                └──▶ plugin
 //! ```
@@ -99,8 +99,9 @@
 //! | [`offline`] | training views, metrics, scores, pruning, quantization, levels of detail, reports: from a checkpoint to a small capture | `offline` |
 //! | `plugin` | Bevy | `bevy` |
 //! | [`cli`] | the `gs4d` command: options and printing over [`offline`] | `cli` |
+//! | `storage` | the same command, with URLs in place of files | `storage` |
 //!
-//! The last four are the gates of the crate: each is behind one feature, and nothing inside them is. It is not quite a list:
+//! The last five are the gates of the crate: each is behind one feature, and nothing inside them is. It is not quite a list:
 //!
 //! * [`codec`] and [`mod@reference`] lie side by side: one reads files, the other draws, and neither needs the other.
 //! * `plugin` lies beside [`offline`] and does not use it, so that a game compiles neither datasets nor metrics. What both need lies
@@ -182,6 +183,8 @@ pub mod reference;
 #[cfg(feature = "renderer")]
 pub mod renderer;
 pub mod scene;
+#[cfg(feature = "storage")]
+pub mod storage;
 pub mod view;
 
 #[cfg(feature = "bevy")]

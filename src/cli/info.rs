@@ -172,15 +172,15 @@ impl Facts {
 
     fn of_package(info: &PackageInfo) -> Self {
         let header = &info.header;
-        let (form, model, codebooks) = match header.form {
-            StoredForm::Trained { model } => ("trained", Some(model), None),
-            StoredForm::Sliced => ("runtime", None, None),
-            StoredForm::Packed { codebooks } => ("packed", None, codebooks),
+        let (model, codebooks) = match header.form {
+            StoredForm::Trained { model } => (Some(model), None),
+            StoredForm::Sliced => (None, None),
+            StoredForm::Packed { codebooks } => (None, codebooks),
         };
         let used = |all: [u32; MAX_STAGES]| all.into_iter().filter(|&entries| entries > 0).collect::<Vec<_>>();
         Self {
             gaussians: header.gaussians,
-            form,
+            form: header.form.name(),
             model,
             color: ColorDegrees { coefficients: header.coefficients, degree: header.degree, degree_t: header.degree_t },
             codebooks: codebooks.map(used),

@@ -70,6 +70,18 @@ impl Harmonics {
         }
     }
 
+    /// Returns the harmonics of the Gaussians at these indices, in this order.
+    ///
+    /// # Panics
+    /// If an index is out of range.
+    pub(crate) fn select(&self, keep: &[u32]) -> Self {
+        let mut values = Vec::with_capacity(keep.len() * self.coefficients * 3);
+        for &index in keep {
+            values.extend_from_slice(self.of(index as usize));
+        }
+        Self { values, ..*self }
+    }
+
     /// Returns whether the parts fit together for `count` Gaussians: degrees in range, and enough coefficients and
     /// values for them.
     pub fn is_consistent(&self, count: usize) -> bool {

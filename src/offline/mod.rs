@@ -19,11 +19,13 @@
 //! | [`quantize`], [`convert`] | changes the form that a scene is stored in |
 //! | [`detail`](mod@detail) | makes the same capture with fewer Gaussians, for pictures of few pixels |
 //! | [`bake`](mod@bake), [`report`] | runs all steps in order, resumable, and writes a report |
+//! | `fleet` | compares the results of many bakes on one page |
 //! | [`metrics`], `evaluation`, `fidelity`, `comparison` | measures how close pictures are |
 //! | [`ablation`] | tabulates the loss by every score, ratio and filter |
 //! | `shaders`, `layout` | compose the passes of scoring and training, and mirror their structures |
 //! | `files` | refuses outputs that are inputs or cannot be written, before anything is computed |
 //! | `stages`, `store`, `stored` | run stages and keep their results, from which interrupted work resumes |
+//! | `names` | the names of files that are copies of files elsewhere |
 //! | `unfinished` | lists the files and folders that are removed if a process ends before its work |
 //! | `export` | writes files of other makes |
 //! | [`orbit`], `render` | draws a scene from all sides, many pictures at a time |
@@ -42,9 +44,11 @@ pub(crate) mod export;
 pub(crate) mod fidelity;
 pub(crate) mod files;
 pub mod fine_tune;
+pub(crate) mod fleet;
 pub(crate) mod layout;
 pub(crate) mod memory_check;
 pub mod metrics;
+pub(crate) mod names;
 pub mod orbit;
 mod package_size;
 pub(crate) mod picture_file;
@@ -66,7 +70,7 @@ pub(crate) mod store;
 pub(crate) mod stored;
 mod subject;
 pub(crate) mod temporal_filter;
-mod temporary_file;
+pub(crate) mod temporary_file;
 mod test_comparison;
 pub(crate) mod train;
 mod trained_pixel;

@@ -3,7 +3,7 @@
 //! In: a scene of any form and a score for each Gaussian. Out: the scene with some of the Gaussians, in their original
 //! order, with their color and their part of the temporal filter.
 
-use crate::gaussian::{Harmonics, Parameters};
+use crate::gaussian::Parameters;
 use crate::scene::{Form, GaussianScene, SceneForm, Sliced, Trained};
 
 /// Returns how many of `count` Gaussians remain when this fraction (0 to 1) is removed: `round((1 − ratio)
@@ -31,11 +31,11 @@ pub fn select(scene: &GaussianScene, keep: &[u32]) -> GaussianScene {
     let form = match &scene.form {
         SceneForm::Trained(Trained { parameters, harmonics }) => SceneForm::Trained(Trained {
             parameters: select_parameters(parameters, keep),
-            harmonics: select_harmonics(harmonics, keep),
+            harmonics: harmonics.select(keep),
         }),
         SceneForm::Ready(Form::Sliced(Sliced { gaussians, harmonics })) => SceneForm::Ready(Form::Sliced(Sliced {
             gaussians: rows(gaussians, keep),
-            harmonics: select_harmonics(harmonics, keep),
+            harmonics: harmonics.select(keep),
         })),
         SceneForm::Ready(Form::Packed(_)) => return select(&scene.clone().unpacked(), keep),
     };
@@ -59,14 +59,6 @@ fn select_parameters(parameters: &Parameters, keep: &[u32]) -> Parameters {
         rotation_r: rows(&parameters.rotation_r, keep),
         opacity_logit: rows(&parameters.opacity_logit, keep),
     }
-}
-
-pub(super) fn select_harmonics(harmonics: &Harmonics, keep: &[u32]) -> Harmonics {
-    let mut values = Vec::with_capacity(keep.len() * harmonics.coefficients * 3);
-    for &index in keep {
-        values.extend_from_slice(harmonics.of(index as usize));
-    }
-    Harmonics { values, ..*harmonics }
 }
 
 /// Returns these rows of an attribute; an attribute that the model does not have stays empty.

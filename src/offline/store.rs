@@ -14,6 +14,9 @@ use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+/// The endings of folders of intermediate results, after the name of the output: those of a bake and of fine-tuning.
+pub(crate) const WORK_ENDINGS: [&str; 2] = [".bake", ".tune"];
+
 /// First bytes of every stored result.
 const MAGIC: [u8; 4] = *b"GS4W";
 /// Version of the stored results: other versions count as absent.

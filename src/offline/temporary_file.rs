@@ -14,7 +14,7 @@ const PREFIX: &str = ".gs4d-";
 const SUFFIX: &str = ".part";
 
 /// A temporary file. It is removed when it is dropped, and when the process ends, unless it has replaced its output.
-pub(super) struct Part {
+pub(crate) struct Part {
     /// The open file.
     pub file: File,
     path: PathBuf,
@@ -37,7 +37,7 @@ impl Drop for Part {
 ///
 /// # Errors
 /// A folder that cannot be written to.
-pub(super) fn create(target: PathBuf) -> io::Result<Part> {
+pub(crate) fn create(target: PathBuf) -> io::Result<Part> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(PREFIX).suffix(SUFFIX);
     #[cfg(unix)]
@@ -65,11 +65,12 @@ pub(super) fn create(target: PathBuf) -> io::Result<Part> {
 
 /// Replaces outputs by complete files; each is given with the path of its output as the user has named it. Outputs after the first belong
 /// to the first: they are removed before the first is replaced, so that they are never beside another first output than their own, even if
-/// the process is killed.
+/// the process is killed. `are_results` says whether they are results of the work, which are listed if it is interrupted; copies of inputs
+/// are not.
 ///
 /// # Errors
 /// The first output that cannot be replaced, by name.
-pub(super) fn replace(mut parts: Vec<(Part, PathBuf)>) -> Result<(), CodecError> {
+pub(crate) fn replace(mut parts: Vec<(Part, PathBuf)>, are_results: bool) -> Result<(), CodecError> {
     // Unlocked before the parts are dropped.
     let mut unfinished = unfinished::lock();
     let at = |path: &Path, error: io::Error| CodecError { path: path.to_owned(), kind: error.into() };
@@ -83,13 +84,15 @@ pub(super) fn replace(mut parts: Vec<(Part, PathBuf)>) -> Result<(), CodecError>
         fs::rename(&part.path, &part.target).map_err(|error| at(path, error))?;
         part.has_replaced = true;
         unfinished.take_file(&part.path);
-        unfinished.add_output(path);
+        if are_results {
+            unfinished.add_output(path);
+        }
     }
     Ok(())
 }
 
 /// Removes the temporary files of killed runs. Files that cannot be opened are kept.
-pub(super) fn remove_stale(folder: &Path) {
+pub(crate) fn remove_stale(folder: &Path) {
     let Ok(entries) = fs::read_dir(folder) else { return };
     for path in entries.flatten().map(|entry| entry.path()).filter(|path| is_part(path)) {
         // The lock is held until the file is removed, so that no other run begins to write to it.
@@ -108,7 +111,7 @@ fn is_part(path: &Path) -> bool {
 }
 
 /// Returns the folder of a file: the current folder for a name alone.
-pub(super) fn folder_of(path: &Path) -> &Path {
+pub(crate) fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
@@ -146,7 +149,7 @@ mod tests {
             [&package, &report, &other].map(part).into()
         };
         let texts = || [&package, &report, &other].map(|path| fs::read_to_string(path).ok());
-        replace(parts("first")).expect("nothing is in the way");
+        replace(parts("first"), true).expect("nothing is in the way");
         assert_eq!(
             texts(),
             [Some("first".to_owned()), Some("first".to_owned()), Some("first".to_owned())],
@@ -154,7 +157,7 @@ mod tests {
         );
         fs::remove_file(&other).expect("the file exists");
         fs::create_dir(&other).expect("the folder can be written to");
-        let error = replace(parts("second")).expect_err("a folder is in the way").to_string();
+        let error = replace(parts("second"), true).expect_err("a folder is in the way").to_string();
         assert!(error.contains("out.html"), "the error names the output: {error}");
         assert_eq!(texts(), [Some("first".to_owned()), None, None], "the old package is beside no report");
         assert_eq!(fs::read_dir(folder.path()).expect("the folder").count(), 2, "no temporary file is left");

@@ -28,7 +28,7 @@ pub(crate) use filter::MAX_SEGMENTS;
 pub use filter::{ActiveSets, FilterKind, TemporalFilter};
 pub use form::{ColorDegrees, Form, SceneForm, Trained};
 pub use gaussian_scene::GaussianScene;
-pub use packed::{CodedColors, PackedColors, PackedScene};
+pub use packed::{Bits, CodedColors, PackError, PackedColors, PackedScene, Packing};
 pub use pick::{Pick, PickSettings};
 pub use provenance::{PlaybackHints, RotationConvention, TrainedCameras, TrainedWith, UpAxis};
 pub use runtime_scene::{Level, RuntimeScene};

@@ -23,6 +23,7 @@ mod own_shadows;
 mod picker;
 mod picking_backend;
 mod playback;
+mod processed;
 mod released;
 mod shade;
 mod shadows;

@@ -15,6 +15,7 @@ mod export;
 #[cfg(target_os = "linux")]
 mod faults;
 mod fine_tune;
+mod fleet;
 #[cfg(target_os = "linux")]
 mod kills;
 mod options;
@@ -26,6 +27,8 @@ mod signals;
 // The limit of the address space is set by a shell and read from `/proc`.
 #[cfg(target_os = "linux")]
 mod sizes;
+#[cfg(feature = "storage")]
+mod storage;
 mod train;
 
 #[path = "../support"]

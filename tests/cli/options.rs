@@ -232,3 +232,14 @@ fn the_error_of_an_option_is_json_with_json() {
         "the whole sentence"
     );
 }
+
+#[cfg(not(feature = "storage"))]
+#[test]
+fn urls_are_refused_with_the_feature_that_reads_them() {
+    for command in [
+        arguments!["info", "s3://bucket/a.gs4d"].to_vec(),
+        arguments!["synth", "--count", "9", "-o", "https://host/a.gs4d"].to_vec(),
+    ] {
+        gs4d(&command).must_fail("built with the feature storage");
+    }
+}

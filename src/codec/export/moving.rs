@@ -8,10 +8,8 @@
 use super::error::ExportError;
 use super::still::Ready;
 use crate::codec::import::columns::{Columns, Motion};
-use crate::gaussian::Gaussian;
-use crate::scene::{FilterKind, GaussianScene, TemporalFilter};
+use crate::scene::{FilterKind, GaussianScene};
 use rayon::prelude::*;
-use std::collections::HashMap;
 use std::f64::consts::TAU;
 
 /// Returns all Gaussians. The temporal filter stays if `keeps_filter`.
@@ -25,7 +23,7 @@ pub(crate) fn moving(scene: &GaussianScene, keeps_filter: bool) -> Result<(Colum
     match &scene.filter {
         Some(filter) if keeps_filter => columns.filter = Some(filter.clone()),
         Some(filter) if filter.kind != FilterKind::Support => {
-            if is_needed(filter, &ready.gaussians) {
+            if filter.kind == FilterKind::Window {
                 return Err(ExportError::Unsupported(
                     "its Gaussians are switched on and off at certain times, which this format cannot say; export a sequence (--sequence), or as .4dgs"
                         .to_owned(),
@@ -71,27 +69,6 @@ fn mean_cosine(frequency: f64, [from, to]: [f64; 2]) -> f32 {
     let half = frequency * (to - from) / 2.0;
     let around = if half.abs() < 1e-6 { 1.0 } else { half.sin() / half };
     ((frequency * (from + to) / 2.0).cos() * around) as f32
-}
-
-/// Returns whether a filter is a part of the motion: it switches Gaussians that never fade, as in a sequence of frames, or Gaussians that are pieces
-/// of one path, which have the same lifespan and opacity.
-fn is_needed(filter: &TemporalFilter, gaussians: &[Gaussian]) -> bool {
-    let is_partial = |index: usize| !(0..filter.segments).all(|segment| filter.is_active(segment, index));
-    let mut pieces: HashMap<[u32; 3], usize> = HashMap::new();
-    let mut partial = 0;
-    for (index, gaussian) in gaussians.iter().enumerate() {
-        if !is_partial(index) {
-            continue;
-        }
-        if gaussian.sigma_t.is_infinite() {
-            return true;
-        }
-        partial += 1;
-        *pieces.entry([gaussian.mean_t, gaussian.sigma_t, gaussian.opacity].map(f32::to_bits)).or_default() += 1;
-    }
-    let alike: usize = pieces.into_values().filter(|&count| count > 1).sum();
-    // Few Gaussians that are no pieces agree in all three.
-    alike * 10 > partial
 }
 
 #[cfg(test)]

@@ -80,6 +80,15 @@ pub enum StoredForm {
 }
 
 impl StoredForm {
+    /// Returns the name of the form.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Trained { .. } => "trained",
+            Self::Sliced => "runtime",
+            Self::Packed { .. } => "packed",
+        }
+    }
+
     /// Returns the form of a scene.
     pub fn of(form: &SceneForm) -> Self {
         match form {

@@ -11,9 +11,9 @@ use crate::offline::quantize::roundings;
 use crate::offline::shaders::SHADERS;
 use crate::renderer::bind::{Bind, group_layout, pipeline};
 use crate::renderer::{GpuError, Headless, ShaderChecks};
+use crate::scene::Bits;
 use crate::scene::TrainedWith;
 use crate::scene::packed::Rounding;
-use crate::scene::packed::encode::Bits;
 use wgpu::BufferUsages;
 
 /// Steps between two roundings, at least and at most. The CPU encodes all Gaussians, which takes as long as some steps.

@@ -44,8 +44,7 @@ use crate::offline::quantize::codebook::Centers;
 use crate::offline::shaders::{COMPAT, COMPAT_WITHOUT_TIME};
 use crate::renderer::memory::binding_limit;
 use crate::renderer::{GpuCapture, GpuError, Headless, ShaderChecks};
-use crate::scene::packed::encode::Bits;
-use crate::scene::{Environment, GaussianScene, SceneForm, TemporalFilter, Trained};
+use crate::scene::{Bits, Environment, GaussianScene, SceneForm, TemporalFilter, Trained};
 use crate::view::{Background, Frame, View};
 use std::collections::VecDeque;
 

@@ -4,32 +4,26 @@
 //! form, its Gaussians in Morton order and without levels of detail, and a [`CompressReport`].
 //!
 //! 1. [`CompressSettings`] specify how much may be lost.
-//! 2. `anchor` moves temporal means close to the time interval.
-//! 3. `order` sorts the Gaussians, so that neighbors share a box.
-//! 4. `codebook` trains the codebooks of color.
-//! 5. `scene::packed` encodes the result as records.
+//! 2. `codebook` trains the codebooks of color, if there are any.
+//! 3. `scene::packed` moves temporal means close to the time interval, sorts the Gaussians and encodes them as records.
 
-mod anchor;
 pub(crate) mod codebook;
-pub(crate) mod order;
 pub(crate) mod roundings;
 mod settings;
 
 pub(crate) use roundings::roundings;
 pub use settings::{CompressSettings, Quality};
 
-use super::prune::select_harmonics;
-use crate::gaussian::{Gaussian, Harmonics, InvalidGaussian};
+use crate::gaussian::{Harmonics, InvalidGaussian};
 use crate::scene::packed::MAX_STAGES;
-use crate::scene::packed::encode::Bits;
+use crate::scene::packed::anchor::move_near;
+use crate::scene::packed::order::morton_order;
+use crate::scene::packed::pack::pack_ordered;
 use crate::scene::{
-    CodedColors, FilterKind, Form, GaussianScene, PackedColors, PackedScene, RuntimeScene, SceneForm, TemporalFilter,
-    TrainedWith,
+    Bits, CodedColors, Form, GaussianScene, PackError, PackedColors, Packing, RuntimeScene, SceneForm, TrainedWith,
 };
 use codebook::Centers;
 use ndarray::Array2;
-use order::morton_order;
-use rayon::prelude::*;
 use serde::Serialize;
 
 /// Figures of a compression. Default: zeros.
@@ -80,6 +74,17 @@ pub enum CompressError {
     /// A Gaussian cannot be drawn.
     #[error(transparent)]
     Invalid(#[from] InvalidGaussian),
+}
+
+impl From<PackError> for CompressError {
+    fn from(error: PackError) -> Self {
+        match error {
+            PackError::AlreadyPacked => Self::AlreadyPacked,
+            PackError::ColorStep(step) => Self::ColorStep(step),
+            PackError::Range(reason) => Self::Range(reason),
+            PackError::Extreme { index, reason } => Self::Extreme { index, reason },
+        }
+    }
 }
 
 /// Checks that a scene has not been compressed before, which would round its values twice.
@@ -155,11 +160,12 @@ pub(crate) fn train_codebooks(scene: &RuntimeScene, settings: &CompressSettings)
     Ok(Centers::train(rest_of(&sliced.harmonics, &order), &weights, &settings.codebooks, || {}))
 }
 
-/// Returns a scene whose temporal means are close to the time interval, if its geometry is quantized.
+/// Returns a scene whose temporal means are close to the time interval, if codebooks are trained for quantized geometry.
 fn anchored(mut scene: RuntimeScene, settings: &CompressSettings) -> RuntimeScene {
-    if let (Form::Sliced(sliced), Some(_)) = (&mut scene.form, &settings.geometry) {
+    if let (Form::Sliced(sliced), Some(_), false) = (&mut scene.form, &settings.geometry, settings.codebooks.is_empty())
+    {
         let TrainedWith { time_interval, marginal_cutoff, .. } = scene.trained_with;
-        anchor::move_near(&mut sliced.gaussians, time_interval, marginal_cutoff);
+        move_near(&mut sliced.gaussians, time_interval, marginal_cutoff);
     }
     scene
 }
@@ -176,10 +182,7 @@ fn compress_by(
     if books.len() > MAX_STAGES || books.iter().any(|&entries| !(1..=1 << 16).contains(&entries)) {
         return Err(CompressError::Codebooks(books.clone()));
     }
-    let step = settings.color_step;
-    if step != 0.0 && !(step.is_normal() && step > 0.0) {
-        return Err(CompressError::ColorStep(step));
-    }
+    Packing { color_step: settings.color_step, ..Packing::default() }.check()?;
     let mut report = CompressReport { gaussians: scene.len(), memory_before: scene.size(), ..Default::default() };
     let Some(bits) = &settings.geometry else {
         if !books.is_empty() {
@@ -188,75 +191,21 @@ fn compress_by(
         report.memory_after = report.memory_before;
         return Ok((scene.into(), report));
     };
-    let order = morton_order(&sliced.gaussians);
-    let (colors, base) = if books.is_empty() {
-        let whole = rounded(select_harmonics(&sliced.harmonics, &order), step);
-        (PackedColors::Whole(whole), [0.0; 2])
-    } else {
-        let weights = match &settings.weights {
-            Some(weights) => order.iter().map(|&index| weights[index as usize]).collect(),
-            None => order.iter().map(|&index| sliced.gaussians[index as usize].opacity).collect::<Vec<_>>(),
-        };
-        let (coded, base) = code(&sliced.harmonics, &order, bits, |rest| train(rest, &weights, books));
-        report.codebooks.clone_from(&coded.entries);
-        (PackedColors::Coded(coded), base)
-    };
-    let packed = encode(&sliced.gaussians, &order, bits, colors, base, scene.trained_with.time_span());
-    packed.check().map_err(CompressError::Range)?;
-    check_each(&packed, &order)?;
-    let filter = scene.filter.map(|filter| match filter.kind {
-        // Lifespans are rounded too: the filter must be exact for the Gaussians that are drawn.
-        FilterKind::Support => {
-            let gaussians = (0..packed.len()).map(|index| packed.gaussian(index));
-            TemporalFilter::support(
-                gaussians,
-                scene.trained_with.time_interval,
-                scene.trained_with.marginal_cutoff,
-                filter.segments,
-            )
-        }
-        FilterKind::KeyFrame | FilterKind::Interval | FilterKind::Window => filter.select(&order),
-    });
-    report.memory_after = packed.size();
-    let scene = GaussianScene {
-        form: SceneForm::Ready(Form::Packed(packed)),
-        filter,
-        environment: scene.environment,
-        trained_with: scene.trained_with,
-        playback: scene.playback,
-        levels: Vec::new(),
-    };
-    Ok((scene, report))
-}
-
-/// Packs Gaussians in the given order.
-fn encode(
-    gaussians: &[Gaussian],
-    order: &[u32],
-    bits: &Bits,
-    colors: PackedColors,
-    base: [f32; 2],
-    reach: f32,
-) -> PackedScene {
-    let ordered: Vec<Gaussian> = order.iter().map(|&index| gaussians[index as usize]).collect();
-    PackedScene::encode(&ordered, bits, colors, base, reach)
-}
-
-/// Checks that every Gaussian can still be drawn; `order` has their indices before they were packed.
-fn check_each(packed: &PackedScene, order: &[u32]) -> Result<(), CompressError> {
-    let reason = |place: usize| packed.gaussian(place).check().err();
-    let extreme = |place| Some(CompressError::Extreme { index: order[place], reason: reason(place)? });
-    (0..order.len()).into_par_iter().find_map_first(extreme).map_or(Ok(()), Err)
-}
-
-/// Rounds coefficients to multiples of `step`, if it is positive. Those whose multiple single precision cannot hold stay as they are.
-fn rounded(mut harmonics: Harmonics, step: f32) -> Harmonics {
-    let multiple = |value: f32| (value / step).round() * step;
-    if step > 0.0 {
-        let coarse = harmonics.values.iter_mut().filter(|value| multiple(**value).is_finite());
-        coarse.for_each(|value| *value = multiple(*value));
+    if books.is_empty() {
+        let packed = scene.pack(&Packing { bits: *bits, color_step: settings.color_step })?;
+        report.memory_after = packed.size();
+        return Ok((packed.into(), report));
     }
-    harmonics
+    let order = morton_order(&sliced.gaussians);
+    let weights = match &settings.weights {
+        Some(weights) => order.iter().map(|&index| weights[index as usize]).collect(),
+        None => order.iter().map(|&index| sliced.gaussians[index as usize].opacity).collect::<Vec<_>>(),
+    };
+    let (coded, base) = code(&sliced.harmonics, &order, bits, |rest| train(rest, &weights, books));
+    report.codebooks.clone_from(&coded.entries);
+    let packed = pack_ordered(scene, bits, &order, PackedColors::Coded(coded), base)?;
+    report.memory_after = packed.size();
+    Ok((packed.into(), report))
 }
 
 /// Returns the colors by the codebooks that `train` returns, in the given order, and the ends of the range of their first

@@ -2,12 +2,13 @@
 //!
 //! In: Gaussians and the bits of the packed form. Out: the differences between each Gaussian and its packed form.
 
-use super::order::morton_order;
-use super::{CompressError, check_each, encode};
+use super::CompressError;
 use crate::gaussian::{Gaussian, Harmonics};
+use crate::scene::Bits;
 use crate::scene::PackedColors;
 use crate::scene::packed::Rounding;
-use crate::scene::packed::encode::Bits;
+use crate::scene::packed::order::morton_order;
+use crate::scene::packed::pack::{check_each, encode_ordered};
 use rayon::prelude::*;
 
 /// Returns what [`compress`](super::compress) would change of the geometry of each Gaussian; `reach` is the length of the time interval, timestamp units.
@@ -16,7 +17,7 @@ use rayon::prelude::*;
 /// A Gaussian that the packed form cannot hold.
 pub fn roundings(gaussians: &[Gaussian], bits: &Bits, reach: f32) -> Result<Vec<Rounding>, CompressError> {
     let order = morton_order(gaussians);
-    let packed = encode(gaussians, &order, bits, PackedColors::Whole(Harmonics::default()), [0.0; 2], reach);
+    let packed = encode_ordered(gaussians, &order, bits, PackedColors::Whole(Harmonics::default()), [0.0; 2], reach);
     check_each(&packed, &order)?;
     let mut places = vec![0; order.len()];
     order.iter().enumerate().for_each(|(place, &index)| places[index as usize] = place);

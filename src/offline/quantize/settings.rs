@@ -7,7 +7,7 @@
 //! `shaders/shared/packed.wgsl`, if records are read in another way; and `cli/compress.rs`, with its name on the
 //! command line.
 
-use crate::scene::packed::encode::Bits;
+use crate::scene::{Bits, Packing};
 use serde::{Deserialize, Serialize};
 
 /// Gaussians for each entry of a codebook, at least, and entries of a codebook, at least.
@@ -96,23 +96,10 @@ impl From<Quality> for CompressSettings {
                 }),
                 vec![2048, 2048, 2048, 1024],
             ),
-            Quality::VisuallyLossless => (
-                Some(Bits {
-                    mean: 14,
-                    mean_t: 14,
-                    velocity: 12,
-                    sigma_t: 10,
-                    scale: 11,
-                    rotation: 11,
-                    opacity: 10,
-                    base: 10,
-                    escape: 0.03,
-                }),
-                Vec::new(),
-            ),
+            Quality::VisuallyLossless => (Some(Bits::default()), Vec::new()),
             Quality::Lossless => (None, Vec::new()),
         };
-        let color_step = if quality == Quality::VisuallyLossless { 1.0 / 256.0 } else { 0.0 };
+        let color_step = if quality == Quality::VisuallyLossless { Packing::default().color_step } else { 0.0 };
         Self { geometry, codebooks, color_step, weights: None }
     }
 }

@@ -54,7 +54,7 @@ pub struct BakeReport {
 }
 
 /// A value before and after the bake.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Change<T> {
     /// Of the checkpoint.
     pub before: T,
@@ -63,7 +63,7 @@ pub struct Change<T> {
 }
 
 /// The duration of a stage.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StageTime {
     /// Its name.
     pub name: String,

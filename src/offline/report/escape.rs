@@ -3,6 +3,6 @@
 //! In: any text. Out: the text with the special characters of HTML escaped.
 
 /// Escapes the special characters of HTML.
-pub(super) fn escape(text: &str) -> String {
+pub(in crate::offline) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

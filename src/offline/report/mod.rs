@@ -3,7 +3,7 @@
 //! In: the results of the stages of a bake. Out: a [`BakeReport`], as JSON and as one self-contained HTML page.
 
 mod bake_report;
-mod escape;
+pub(super) mod escape;
 pub(crate) mod files;
 mod html;
 pub(crate) mod plot;

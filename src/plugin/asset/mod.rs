@@ -14,6 +14,8 @@
 //!                                               CaptureReady             and CaptureState on the entity
 //! ```
 //!
+//! In `AssetMode::Processed` a [`CaptureProcessor`] makes packages of checkpoints before the game loads them.
+//!
 //! Loading runs off the main thread, and uploading is spread over frames: neither blocks a frame. When a file changes that Bevy watches, or
 //! a game calls `AssetServer::reload`, the old capture is drawn until the new one is on the GPU. If the new capture is invalid or does not
 //! fit, the old one stays. A capture and its GPU memory are freed with its last handle. Without a renderer, captures are ready once they are
@@ -22,6 +24,7 @@
 mod loader;
 mod messages;
 mod plugin;
+mod processor;
 mod saver;
 mod state;
 mod systems;
@@ -32,6 +35,9 @@ pub use loader::{CaptureLoadError, CheckpointLoader, ImportLoader, PackageLoader
 pub(crate) use messages::send;
 pub use messages::{CaptureFailed, CaptureReady};
 pub(crate) use plugin::CaptureAssetPlugin;
+pub use processor::{
+    CaptureProcessor, CaptureTransformError, CaptureTransformer, CaptureTransformerSettings, ProcessedForm,
+};
 pub use saver::{CaptureSaveError, PackageSaver, PackageSaverSettings};
 pub use state::{CaptureAssetSystems, CaptureState};
 pub(crate) use uploads::Uploads;

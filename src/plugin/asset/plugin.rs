@@ -1,9 +1,10 @@
-//! The asset plugin: the loaders, the loading state of entities, and its messages.
+//! The asset plugin: the loaders, the processor, the loading state of entities, and its messages.
 //!
 //! In: an app with Bevy's `AssetPlugin`. Out: the same app, in which captures load and every entity with one has a [`CaptureState`].
 
 use super::loader::{CheckpointLoader, ImportLoader, PackageLoader};
 use super::messages::{CaptureFailed, CaptureReady};
+use super::processor;
 use super::state::{CaptureAssetSystems, CaptureState};
 use super::systems::{any_upload_failure, report_upload_failures, update_states};
 use super::uploads::Uploads;
@@ -42,5 +43,6 @@ impl Plugin for CaptureAssetPlugin {
                 stand_upright.run_if(any_with_component::<Upright>).before(TransformSystems::Propagate),
             )
             .add_systems(PreUpdate, report_upload_failures.run_if(any_upload_failure).after(CaptureAssetSystems));
+        processor::register(app);
     }
 }

@@ -18,8 +18,9 @@ use std::f64::consts::FRAC_1_SQRT_2;
 /// floor has no visible effect up to 100 dB.
 const FLATTEST: f32 = 1.0 / 16_384.0;
 
-/// Number of bits of each attribute.
+/// Number of bits of each attribute. Default: no visible difference.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct Bits {
     /// Mean, per axis, within the box of its block; 1 to 16.
     pub mean: u32,
@@ -39,6 +40,22 @@ pub struct Bits {
     pub base: u32,
     /// Fraction of the Gaussians, those with the largest splats, that keep 16 bits for scale, rotation and mean; 0 to 1.
     pub escape: f32,
+}
+
+impl Default for Bits {
+    fn default() -> Self {
+        Self {
+            mean: 14,
+            mean_t: 14,
+            velocity: 12,
+            sigma_t: 10,
+            scale: 11,
+            rotation: 11,
+            opacity: 10,
+            base: 10,
+            escape: 0.03,
+        }
+    }
 }
 
 impl PackedScene {

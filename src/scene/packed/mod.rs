@@ -7,21 +7,29 @@
 //! |---|---|
 //! | `scene.rs` | the packed form, and its checks |
 //! | `lanes.rs` | the position and the range of each value in a record, for the encoder and the decoder |
+//! | `pack.rs` | from a scene to its packed form |
+//! | `anchor.rs` | temporal means near the time interval |
+//! | `order.rs` | the order of the Gaussians: neighbors share a box |
 //! | `encode.rs` | from Gaussians to records and ranges |
 //! | `decode.rs` | from records and ranges to Gaussians and colors |
 //! | `rounding.rs` | the change of a Gaussian by packing |
 //! | `shape.rs` | a covariance as scales and a rotation, and back |
 //! | `colors.rs` | colors by codebook, and back |
 
+pub(crate) mod anchor;
 mod colors;
 mod decode;
 pub(crate) mod encode;
 mod lanes;
+pub(crate) mod order;
+pub(crate) mod pack;
 mod rounding;
 mod scene;
 mod shape;
 
 pub use colors::CodedColors;
+pub use encode::Bits;
 pub use lanes::{BLOCK, BLOCK_RANGES, COLOR_WORDS, MAX_ENTRIES, MAX_STAGES, RECORD_WORDS, SHARED_RANGES};
+pub use pack::{PackError, Packing};
 pub use rounding::Rounding;
 pub use scene::{PackedColors, PackedScene};

@@ -20,7 +20,7 @@ const CHANGE: f64 = 0.002;
 const LONG: f64 = 1000.0;
 
 /// Moves temporal means that are far from the interval close to it. `cutoff` is the marginal at and below which a Gaussian is not drawn.
-pub(super) fn move_near(gaussians: &mut [Gaussian], interval: [f32; 2], cutoff: f32) {
+pub(crate) fn move_near(gaussians: &mut [Gaussian], interval: [f32; 2], cutoff: f32) {
     let [start, end] = interval.map(f64::from);
     let (middle, span) = (0.5 * (start + end), end - start);
     // The interval of a still has no length.
