@@ -208,6 +208,14 @@ pub mod offline {
     pub mod search {
         pub use crate::offline::search::*;
     }
+    /// Gaussians that views show.
+    pub mod seen {
+        pub use crate::offline::seen::*;
+    }
+    /// Work in shards.
+    pub mod shard {
+        pub use crate::offline::shard::Shard;
+    }
     /// Splits of datasets.
     pub mod splits {
         pub use crate::offline::splits::*;

@@ -100,8 +100,7 @@ impl Columns {
             return Err(ImportError::damaged("its attributes have different numbers of Gaussians"));
         }
         let Self { mean, log_scale, rotation, opacity_logit, harmonics, motion, filter } = self;
-        let parameters =
-            Parameters { mean, log_scale, rotation_l: rotation, opacity_logit, ..Parameters::default() };
+        let parameters = Parameters { mean, log_scale, rotation_l: rotation, opacity_logit, ..Parameters::default() };
         let form = if has_motion || filter.is_some() {
             let mut gaussians = parameters.slice(&SliceSettings::default())?;
             for (index, (gaussian, own)) in gaussians.iter_mut().zip(&motion).enumerate() {

@@ -56,7 +56,10 @@ fn checked(name: &str) -> io::Result<&str> {
         Ok(name)
     } else {
         let name = name.escape_debug();
-        Err(io::Error::new(io::ErrorKind::InvalidInput, format!("\"{name}\" is no file in the folder of the file that names it")))
+        Err(io::Error::new(
+            io::ErrorKind::InvalidInput,
+            format!("\"{name}\" is no file in the folder of the file that names it"),
+        ))
     }
 }
 
