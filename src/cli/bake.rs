@@ -188,10 +188,11 @@ fn planned_command(arguments: impl Iterator<Item = OsString>) -> Result<Command,
     while let Some(argument) = arguments.next() {
         let not_text = |_| Failure::new("an argument is not UTF-8, and a plan is text: choose other names of files");
         let argument = argument.map_err(not_text)?;
-        let of_plan = ["--plan", "--shards"];
-        if of_plan.contains(&argument.as_str()) {
-            arguments.next();
-        } else if of_plan.iter().any(|option| argument.strip_prefix(option).is_some_and(|rest| rest.starts_with('='))) {
+        let (name, has_value) = argument.split_once('=').map_or((argument.as_str(), false), |(name, _)| (name, true));
+        if ["--plan", "--shards"].contains(&name) {
+            if !has_value {
+                arguments.next();
+            }
         } else if verb.iter().any(|before| before == "bake") {
             options.push(argument);
         } else {

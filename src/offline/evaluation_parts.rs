@@ -145,7 +145,7 @@ impl Subject<'_> {
 ///
 /// # Errors
 /// As [`parts::in_order`], files that cannot be read.
-pub(crate) fn merge(paths: &[PathBuf], label: &Label, count: usize) -> Result<Evaluation, OfflineError> {
+pub fn merge(paths: &[PathBuf], label: &Label, count: usize) -> Result<Evaluation, OfflineError> {
     let (paths, _) = parts::in_order(paths, Some(label))?;
     let mut all = Vec::new();
     for path in &paths {

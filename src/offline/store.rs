@@ -307,8 +307,11 @@ fn is_at(file: &File, path: &Path) -> bool {
     there.is_some() && open.as_ref().and_then(node) == there.as_ref().and_then(node)
 }
 
-/// Returns whether a file is a stored result.
+/// Returns whether a file is a stored result, or the lock of a stage whose run was killed.
 fn is_stored(path: &Path) -> bool {
+    if path.extension().is_some_and(|extension| extension == LOCK) {
+        return path.is_file();
+    }
     let mut start = [0; MAGIC.len()];
     let read = path.is_file() && File::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok();
     read && start == MAGIC

@@ -131,7 +131,7 @@ pub(crate) fn write_part(
 ///
 /// # Errors
 /// As [`parts::in_order`], files that cannot be read, views that show nothing of the scene.
-pub(crate) fn merge(
+pub fn merge(
     paths: &[PathBuf],
     label: &Label,
     kind: FilterKind,

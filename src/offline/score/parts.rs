@@ -64,7 +64,7 @@ pub(crate) fn write(
 ///
 /// # Errors
 /// As [`parts::in_order`], files that cannot be read, views that show nothing of the scene.
-pub(crate) fn merge(paths: &[PathBuf], expected: Option<&Label>) -> Result<Scores, OfflineError> {
+pub fn merge(paths: &[PathBuf], expected: Option<&Label>) -> Result<Scores, OfflineError> {
     let (paths, _) = parts::in_order(paths, expected)?;
     let mut merged: Option<Scores> = None;
     for path in &paths {

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 /// The computation that a part belongs to, its shard, and the inputs.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) struct Label {
+pub struct Label {
     /// The verb.
     work: String,
     shard: Shard,

@@ -9,4 +9,4 @@ pub(crate) mod part;
 pub(crate) mod parts;
 
 pub use division::Shard;
-pub(crate) use label::Label;
+pub use label::Label;

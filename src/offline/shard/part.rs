@@ -29,7 +29,7 @@ const LEVEL: i32 = 1;
 ///
 /// # Errors
 /// A folder that cannot be written to, a full disk.
-pub(crate) fn write(path: &Path, label: &Label, result: &[u8]) -> Result<(), OfflineError> {
+pub fn write(path: &Path, label: &Label, result: &[u8]) -> Result<(), OfflineError> {
     let label = ron::to_string(label)?.into_bytes();
     let at = |error: io::Error| CodecError { path: path.to_owned(), kind: error.into() };
     let result = zstd::bulk::compress(result, LEVEL).map_err(at)?;
@@ -50,7 +50,7 @@ pub(crate) fn write(path: &Path, label: &Label, result: &[u8]) -> Result<(), Off
 ///
 /// # Errors
 /// A file that cannot be read, is no part, or is damaged.
-pub(crate) fn label(path: &Path) -> Result<Label, OfflineError> {
+pub fn label(path: &Path) -> Result<Label, OfflineError> {
     Ok(read(path)?.0)
 }
 
@@ -58,7 +58,7 @@ pub(crate) fn label(path: &Path) -> Result<Label, OfflineError> {
 ///
 /// # Errors
 /// As [`label`], and a result that is longer.
-pub(crate) fn result(path: &Path, most: usize) -> Result<Vec<u8>, OfflineError> {
+pub fn result(path: &Path, most: usize) -> Result<Vec<u8>, OfflineError> {
     let (_, bytes, start) = read(path)?;
     let compressed = bytes.get(start..).unwrap_or_default();
     let mut result = Vec::new();
@@ -72,7 +72,7 @@ pub(crate) fn result(path: &Path, most: usize) -> Result<Vec<u8>, OfflineError> 
 }
 
 /// Returns whether there is a whole part with this label at a path.
-pub(crate) fn is_there(path: &Path, expected: &Label) -> bool {
+pub fn is_there(path: &Path, expected: &Label) -> bool {
     path.is_file() && label(path).is_ok_and(|label| label == *expected)
 }
 

@@ -9,6 +9,7 @@ mod cameras;
 mod checkpoint;
 mod datasets;
 mod package;
+mod parts;
 mod pictures;
 mod saved;
 mod scores;
@@ -55,7 +56,7 @@ pub struct Kind {
 }
 
 /// The readers.
-pub static KINDS: [Kind; 15] = [
+pub static KINDS: [Kind; 16] = [
     Kind {
         name: "package",
         about: "packages (.gs4d) in every form, with filters and environment maps",
@@ -160,5 +161,12 @@ pub static KINDS: [Kind; 15] = [
         extension: "saved",
         share: 10,
         make: || Arc::new(saved::Saved::new()),
+    },
+    Kind {
+        name: "parts",
+        about: "parts of shards of scores, masks and evaluations",
+        extension: "gs4p",
+        share: 2,
+        make: || Arc::new(parts::Parts::new()),
     },
 ];
