@@ -5,7 +5,7 @@
 #
 # Add what the captures need: --gres=gpu:1 --mem=16G --time=2:00:00, as `needs` of the plans says. A task that a signal has ended goes back to
 # the queue at most five times and resumes; a task that gs4d refuses, with code 2, does not. GS4D_FARM is the folder of run.py, if the
-# array is not submitted from the clone.
+# array is not submitted from the clone. Slurm starts a task again after the time `cred_expire` of its `AuthInfo`, 120 seconds unless set.
 #SBATCH --job-name=gs4d --requeue --open-mode=append
 python3 "${GS4D_FARM:-docs/farm}/run.py" "$1" "$SLURM_ARRAY_TASK_ID"
 code=$?

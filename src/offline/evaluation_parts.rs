@@ -100,31 +100,34 @@ impl Subject<'_> {
         if part::is_there(out, label) {
             return Ok(false);
         }
-        let share = label.shard().share(&vec![1; self.views.len()]);
-        let views = self.views.get(share.clone()).unwrap_or_default();
-        let measured = match views {
-            [] => Measured { background: [0.0; 3], has_gaps: false, views: Vec::new(), contrast: None },
-            views => self.measure(views, share.start, engine, progress)?,
+        let measured = match self.share(label.shard()) {
+            share if share.is_empty() => {
+                Measured { background: [0.0; 3], has_gaps: false, views: Vec::new(), contrast: None }
+            }
+            share => self.measure(&share, engine, progress)?,
         };
         part::write(out, label, &Text(measured).encode()?)?;
         Ok(true)
     }
 
-    /// Evaluates these views, the first of which is number `first` of all.
+    /// Returns the views of a shard.
+    fn share(&self, shard: Shard) -> Vec<TrainingView> {
+        let share = shard.share(&vec![1; self.views.len()]);
+        share.into_iter().filter_map(|index| self.views.get(index).cloned()).collect()
+    }
+
+    /// Evaluates these views.
     fn measure(
         &self,
         views: &[TrainingView],
-        first: usize,
         engine: &mut Engine,
         progress: &mut dyn Progress,
     ) -> Result<Measured, OfflineError> {
         let Self { scene, background, metrics, .. } = *self;
         let evaluation = evaluate_scene(engine, scene, views, background, metrics, progress, |_, _, _| Ok(()))?;
         // All views are drawn over the contrasting background if the image of any view has gaps.
-        let (before, rest) = self.views.split_at_checked(first).unwrap_or_default();
-        let others = before.iter().chain(rest.get(views.len()..).unwrap_or_default());
         let mut any = evaluation.has_gaps;
-        for view in others {
+        for view in self.views {
             any = any || view.load_covered()?.has_gaps;
         }
         let contrast = match any {
@@ -154,33 +157,53 @@ pub fn merge(paths: &[PathBuf], label: &Label, count: usize) -> Result<Evaluatio
         all.push(measured.ok_or_else(|| OfflineError::at(path, "holds no evaluation: make it again with --shard"))?);
     }
     let found: usize = all.iter().map(|part| part.views.len()).sum();
-    let wrong = |path: &PathBuf| OfflineError::at(path, format!("and the other parts hold {found} views of {count}"));
-    let first = paths.first().filter(|_| found != count).map(wrong);
-    first.map_or_else(|| together(&all), Err)
+    // Which views a part has follows from the number of shards and of views.
+    let is_whole = (Shard::all(paths.len() as u32).zip(&all)).all(|(shard, part)| {
+        let share = shard.share(&vec![1; count]).len();
+        part.views.len() == share && part.contrast.as_ref().is_none_or(|(_, errors)| errors.len() == share)
+    });
+    match paths.first() {
+        Some(first) if !is_whole => {
+            Err(OfflineError::at(first, format!("and the other parts hold {found} views of {count}: make them again")))
+        }
+        _ => together(&all, count),
+    }
+}
+
+/// Returns the items of all parts in the order of the views.
+fn in_order_of_views<T>(parts: impl IntoIterator<Item = Vec<T>>, shards: u32, count: usize) -> Vec<T> {
+    let weights = vec![1; count];
+    let numbered =
+        Shard::all(shards).zip(parts).flat_map(|(shard, items)| shard.share(&weights).into_iter().zip(items));
+    let mut numbered: Vec<(usize, T)> = numbered.collect();
+    numbered.sort_by_key(|(number, _)| *number);
+    numbered.into_iter().map(|(_, item)| item).collect()
 }
 
 /// Returns the evaluation of all views.
-fn together(all: &[Measured]) -> Result<Evaluation, OfflineError> {
-    let filled = || all.iter().filter(|part| !part.views.is_empty());
-    let views: Vec<ViewMetrics> = all.iter().flat_map(|part| &part.views).map(ViewMetrics::from).collect();
-    let mean_of = |metrics: &[ImageMetrics]| {
+fn together(all: &[Measured], count: usize) -> Result<Evaluation, OfflineError> {
+    let (shards, mean_of) = (all.len() as u32, |metrics: &[ImageMetrics]| {
         MeanMetrics::of(metrics).ok_or_else(|| OfflineError::at(Path::new("--merge"), "names parts without views"))
-    };
-    let contrast = match filled().map(|part| part.contrast.as_ref()).collect::<Option<Vec<_>>>() {
-        Some(over) if !over.is_empty() => {
-            let metrics: Vec<ImageMetrics> = over.iter().flat_map(|(_, errors)| errors).map(|&e| e.into()).collect();
-            over.first().map(|(background, _)| {
-                Ok::<_, OfflineError>(Contrast { background: *background, mean: mean_of(&metrics)? })
-            })
+    });
+    let views = all.iter().map(|part| part.views.iter().map(ViewMetrics::from).collect());
+    let views: Vec<ViewMetrics> = in_order_of_views(views, shards, count);
+    let mean = mean_of(&views.iter().map(|view| view.metrics).collect::<Vec<_>>())?;
+    let filled: Vec<&Measured> = all.iter().filter(|part| !part.views.is_empty()).collect();
+    let over = filled.first().and_then(|part| part.contrast.as_ref()).map(|(background, _)| *background);
+    let contrast = match over {
+        Some(background) if filled.iter().all(|part| part.contrast.is_some()) => {
+            let errors = |part: &Measured| part.contrast.iter().flat_map(|(_, errors)| errors).copied().collect();
+            let errors: Vec<SquaredError> = in_order_of_views(all.iter().map(errors), shards, count);
+            let metrics: Vec<ImageMetrics> = errors.into_iter().map(ImageMetrics::from).collect();
+            Some(Contrast { background, mean: mean_of(&metrics)? })
         }
         _ => None,
     };
-    let mean = mean_of(&views.iter().map(|view| view.metrics).collect::<Vec<_>>())?;
     Ok(Evaluation {
-        background: filled().next().map_or([0.0; 3], |part| part.background),
+        background: filled.first().map_or([0.0; 3], |part| part.background),
         has_gaps: all.iter().any(|part| part.has_gaps),
         views,
         mean,
-        contrast: contrast.transpose()?,
+        contrast,
     })
 }

@@ -249,7 +249,7 @@ impl Drop for Reserved {
 
 impl Drop for Held {
     fn drop(&mut self) {
-        if self.users == Users::Many && !self.lock.as_ref().is_some_and(|file| file.try_lock().is_ok()) {
+        if self.users == Users::Many && self.lock.as_ref().is_none_or(|file| file.try_lock().is_err()) {
             // Another run still works in the folder.
             return;
         }

@@ -235,4 +235,14 @@ mod tests {
         assert_eq!(keys_every(31, 10), 4, "a whole number of steps");
         assert_eq!((keys_every(1, 20), keys_every(0, 0)), (2, 2), "at least two key-frames");
     }
+
+    #[test]
+    fn the_overlap_of_neighbors_is_the_shared_fraction_of_both() {
+        let filter = TemporalFilter::from_bits(FilterKind::KeyFrame, 3, 4, vec![0b0111, 0b0110, 0]);
+        assert_eq!(
+            neighbor_overlap(&filter),
+            [2.0 / 3.0, 0.0],
+            "two of three Gaussians are in both segments, and none"
+        );
+    }
 }

@@ -121,10 +121,10 @@ fn jobs_in_any_order_give_the_bytes_of_a_bake() {
     let whole = capture.path("whole.gs4d");
     gs4d(&capture.bake(&whole, &BY_VIEWS)).text();
     let whole = fs::read(&whole).expect("the package");
-    for seed in 0..2 {
+    for seed in 0..2u64 {
         let name = format!("jobs{seed}");
         let plan = capture.plan(&name, &[&BY_VIEWS[..], &["--shards", "3"]].concat());
-        let mut random = Random::new(seed.into());
+        let mut random = Random::new(seed);
         run_all(&plan, &mut random, |job, _| {
             // Twice at once, and once more.
             let mut both = [spawn(&plan, job), spawn(&plan, job)];

@@ -23,7 +23,7 @@ use bevy_gs4d::offline::score::Variant;
 use bevy_gs4d::offline::score::{ScoreError, ScoreSettings, Scores};
 use bevy_gs4d::reference::{Layer, render};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
-use bevy_gs4d::scene::{GaussianScene, RuntimeScene, TemporalFilter};
+use bevy_gs4d::scene::{FilterKind, GaussianScene, RuntimeScene, TemporalFilter};
 use bevy_gs4d::view::{Appearance, Background, BlendSpace, Camera, RasterFov, TILE_SIZE, View};
 use glam::{UVec2, Vec2, Vec3};
 use std::path::Path;

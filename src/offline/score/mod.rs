@@ -176,7 +176,7 @@ fn moments(views: &[View], shard: Shard) -> Vec<Vec<View>> {
     views.sort_by(|a, b| a.time.total_cmp(&b.time));
     let moments: Vec<Vec<View>> = views.chunk_by(|a, b| a.time == b.time).map(<[View]>::to_vec).collect();
     let counts: Vec<usize> = moments.iter().map(Vec::len).collect();
-    moments.get(shard.share(&counts)).unwrap_or_default().to_vec()
+    shard.share(&counts).into_iter().filter_map(|index| moments.get(index).cloned()).collect()
 }
 
 fn add(sums: &mut [f64], values: &[f32]) {

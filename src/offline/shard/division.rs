@@ -1,11 +1,11 @@
 //! One of several equal shares of a list.
 //!
-//! In: `I/N`, the weights of the items of a list. Out: the items of the share, which follow one another in the list. The shares of all shards
-//! are the list.
+//! In: `I/N`, the weights of the items of a list. Out: the items of the share. The shares of all shards are the list.
 
 use serde::{Deserialize, Serialize};
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
 use std::fmt;
-use std::ops::Range;
 use std::str::FromStr;
 
 /// Most shards of a computation.
@@ -39,28 +39,22 @@ impl Shard {
         self.count
     }
 
-    /// Returns the items of this shard of a list with these weights. The shares follow one another, and the weight of each differs from an
-    /// equal share by at most that of one item.
-    pub fn share(self, weights: &[usize]) -> Range<usize> {
-        let total = sum(weights);
-        let (index, count) = (u128::from(self.index), u128::from(self.count));
-        // An item belongs to the shard in which the middle of its weight lies.
-        let first_of = |shard: u128| {
-            let mut before = 0;
-            let is_before = |weight: &&usize| {
-                let middle = 2 * before + **weight as u128;
-                before += **weight as u128;
-                middle * count < 2 * total * shard
-            };
-            weights.iter().take_while(is_before).count()
-        };
-        let end = if index + 1 == count { weights.len() } else { first_of(index + 1) };
-        first_of(index).min(end)..end
+    /// Returns the items of this shard of a list with these weights, in order. The shares of all shards are the list, and their weights differ
+    /// by at most that of one item. Each item goes to the lightest share so far, so that neighbors, which take about as long as one another, are
+    /// in different shares.
+    pub fn share(self, weights: &[usize]) -> Vec<usize> {
+        let mut shares: BinaryHeap<Reverse<(u128, u32)>> = (0..self.count).map(|index| Reverse((0, index))).collect();
+        let mut share = Vec::new();
+        for (item, &weight) in weights.iter().enumerate() {
+            let Some(mut lightest) = shares.peek_mut() else { break };
+            let Reverse((weighs, index)) = &mut *lightest;
+            *weighs += weight as u128;
+            if *index == self.index {
+                share.push(item);
+            }
+        }
+        share
     }
-}
-
-fn sum(weights: &[usize]) -> u128 {
-    weights.iter().map(|&weight| weight as u128).sum()
 }
 
 impl fmt::Display for Shard {
@@ -110,21 +104,26 @@ mod tests {
     }
 
     #[test]
-    fn shares_follow_one_another_and_are_nearly_equal() {
+    fn shares_are_the_list_and_nearly_equal() {
         for weights in [vec![1; 600], vec![20; 30], vec![1, 50, 1, 1, 1, 40, 2], vec![3], Vec::new(), vec![0; 5]] {
             for count in [1, 2, 3, 4, 7, 100] {
-                let mut end = 0;
-                for shard in Shard::all(count) {
-                    let share = shard.share(&weights);
-                    assert_eq!(share.start, end, "{shard} of {weights:?} begins where the one before ends");
-                    end = share.end;
-                    let weight = weights[share].iter().sum::<usize>() as f64;
-                    let (equal, most) =
-                        (weights.iter().sum::<usize>() as f64 / f64::from(count), weights.iter().max().unwrap_or(&0));
-                    assert!((weight - equal).abs() <= *most as f64, "{shard} of {weights:?} weighs {weight}");
-                }
-                assert_eq!(end, weights.len(), "the last of {count} shards ends with the list");
+                let shares: Vec<Vec<usize>> = Shard::all(count).map(|shard| shard.share(&weights)).collect();
+                let mut all = shares.concat();
+                all.sort_unstable();
+                assert_eq!(
+                    all,
+                    (0..weights.len()).collect::<Vec<_>>(),
+                    "{count} shares of {weights:?}: each item once"
+                );
+                let heavy: Vec<usize> =
+                    shares.iter().map(|share| share.iter().map(|&item| weights[item]).sum()).collect();
+                let apart = heavy.iter().max().zip(heavy.iter().min()).map_or(0, |(most, least)| most - least);
+                let most = weights.iter().max().copied().unwrap_or(0);
+                assert!(apart <= most, "{count} shares of {weights:?} weigh {heavy:?}");
+                assert!(shares.iter().all(|share| share.is_sorted()), "in the order of the list");
             }
         }
+        let second = "1/4".parse::<Shard>().expect("a shard");
+        assert_eq!(second.share(&[5; 10]), [1, 5, 9], "neighbors are in different shares");
     }
 }
