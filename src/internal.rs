@@ -188,6 +188,10 @@ pub mod offline {
     pub mod evaluation {
         pub use crate::offline::evaluation::*;
     }
+    /// Evaluations in parts.
+    pub mod evaluation_parts {
+        pub use crate::offline::evaluation_parts::*;
+    }
     /// Training.
     pub mod fine_tune {
         pub use crate::offline::fine_tune::adam::*;
@@ -234,12 +238,26 @@ pub mod offline {
         pub use crate::offline::score::engine::*;
         pub use crate::offline::score::file::*;
         pub use crate::offline::score::gpu::*;
+        pub use crate::offline::score::parts::*;
         pub use crate::offline::score::reference::*;
         pub use crate::offline::score::traits::*;
     }
     /// Search for the best score.
     pub mod search {
         pub use crate::offline::search::*;
+    }
+    /// Gaussians that views show.
+    pub mod seen {
+        pub use crate::offline::seen::*;
+    }
+    /// Work in shards.
+    pub mod shard {
+        pub use crate::offline::shard::{Label, Shard};
+
+        /// Files of parts.
+        pub mod part {
+            pub use crate::offline::shard::part::*;
+        }
     }
     /// Splits of datasets.
     pub mod splits {

@@ -1,7 +1,8 @@
 //! `gs4d bake INPUT -o OUT`: from a trained checkpoint, or from pictures, to a small, fast package, and a report of what it cost.
 //!
 //! In: a checkpoint and its training views, or the folder of a dataset alone. Out: a package `NAME.gs4d`, `NAME.report.json` and
-//! `NAME.report.html` beside it, a summary of the report; the capture trained from a dataset as `NAME.trained.gs4d`.
+//! `NAME.report.html` beside it, a summary of the report; the capture trained from a dataset as `NAME.trained.gs4d`; or the stages as jobs for
+//! many machines, or one of these jobs.
 
 use super::args::{CheckpointArgs, EngineArgs, Given, PackageArgs, ScoringArgs, ValidationArgs, score_choice, values};
 use super::failure::Failure;
@@ -9,17 +10,25 @@ use super::interrupt;
 use super::progress::Bars;
 use super::report::Report;
 use super::table::{bytes, lines};
-use crate::offline::bake::{BakeSettings, Baked, bake};
-use crate::offline::engine::Engine;
+use crate::offline::bake::plan::{Command, Source, plan};
+use crate::offline::bake::{BakeSettings, Baked, JOB_STAGES, Job, Scoring, bake, bake_job};
+use crate::offline::engine::{Engine, EngineChoice};
 use crate::offline::evaluation::color_name;
+use crate::offline::files::Files;
 use crate::offline::fine_tune::{FineTuneSettings, GradientSums};
 use crate::offline::quantize::Quality;
 use crate::offline::report::{BakeReport, Change};
 use crate::offline::search::{Goal, ScoreChoice};
+use crate::offline::shard::Shard;
 use crate::offline::splits::SplitOptions;
 use crate::offline::temporal_filter::FILTER_NAMES;
 use crate::offline::train::{TrainSettings, train_dataset, trained_path};
+use crate::offline::{OfflineError, write_beside};
 use crate::scene::{FilterKind, GaussianScene, MAX_SEGMENTS};
+use serde_json::json;
+use std::env;
+use std::ffi::OsString;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Turn a trained checkpoint, or pictures, into a small, fast package: train, score, prune, fine-tune, mask, compress, evaluate, report.
@@ -39,6 +48,7 @@ Examples:
   gs4d bake data/hook --resolution 2 -o hook.gs4d
   gs4d bake hook.trained.gs4d --data data/hook --resolution 2 --target-size 0.6 -o small.gs4d
   gs4d bake n3v.pth --data data/n3v --time-interval 0,10 --max-loss 0.2 --every 20 -o n3v.gs4d
+  gs4d bake n3v.pth --data data/n3v --engine gpu --shards 8 -o n3v.gs4d --plan n3v.json
 
 Beside the package: OUT.report.html with plots and pictures (open it in a browser; it needs no network) and OUT.report.json.
 Every choice is made on validation views, which nothing is trained on. The report compares the test views, which no choice looks at, if
@@ -115,11 +125,92 @@ pub(super) struct Bake {
     #[arg(long)]
     keep_work: bool,
     #[command(flatten)]
+    jobs: JobArgs,
+    #[command(flatten)]
     scoring: ScoringArgs,
     #[command(flatten)]
     engine: EngineArgs,
     #[command(flatten)]
     checkpoint: CheckpointArgs,
+}
+
+/// A bake as jobs for many machines.
+#[derive(clap::Args)]
+#[command(next_help_heading = "Many machines")]
+struct JobArgs {
+    /// Run nothing, and write the stages as jobs to this file: command, needs, inputs and outputs of each, and what it waits for.
+    #[arg(long, value_name = "PLAN.json", conflicts_with_all = ["only", "shard", "keep_work"])]
+    plan: Option<PathBuf>,
+    /// Run this stage alone, from the results in OUT.bake/, which stays; others may run at the same time. The stage report evaluates, too.
+    #[arg(long, value_name = "STAGE", conflicts_with = "keep_work", value_parser = values::one_of(&JOB_STAGES))]
+    only: Option<&'static str>,
+    /// Of the stage score do only shard I of N, 0/N to N-1/N.
+    #[arg(long, value_name = "I/N", requires = "only", conflicts_with = "shards")]
+    shard: Option<Shard>,
+    /// Score in N shards, with a job for each; with --only score put their results together.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    shards: Option<u32>,
+}
+
+/// The stage that there is with a dataset alone.
+const TRAIN: &str = "train";
+
+impl JobArgs {
+    /// Returns the job to run, if it is one, after checking that every option has an effect.
+    fn job(&self, given: &Given, is_dataset: bool) -> Result<Option<Job>, Failure> {
+        let Some(stage) = self.only else {
+            if self.plan.is_none() {
+                given.none_of(&["--shards"], "without --plan or --only score")?;
+            }
+            return Ok(None);
+        };
+        if stage != "score" {
+            given.none_of(&["--shard", "--shards"], "on this stage: they are of --only score")?;
+        }
+        if stage == TRAIN && !is_dataset {
+            return Err(Failure::new(
+                "a checkpoint is trained already: --only train needs the folder of a dataset as INPUT",
+            ));
+        }
+        let scoring = match (self.shard, self.shards) {
+            (Some(shard), _) => Scoring::Shard(shard),
+            (None, Some(shards)) if shards > 1 => Scoring::Merge(shards),
+            (None, _) => Scoring::Whole,
+        };
+        Ok(Some(Job { stage, scoring }))
+    }
+}
+
+/// Returns the command of this process as one to which jobs add options.
+fn planned_command(arguments: impl Iterator<Item = OsString>) -> Result<Command, Failure> {
+    let mut arguments = arguments.skip(1).map(OsString::into_string);
+    let (mut verb, mut options) = (vec!["gs4d".to_owned()], Vec::new());
+    while let Some(argument) = arguments.next() {
+        let not_text = |_| Failure::new("an argument is not UTF-8, and a plan is text: choose other names of files");
+        let argument = argument.map_err(not_text)?;
+        let (name, has_value) = argument.split_once('=').map_or((argument.as_str(), false), |(name, _)| (name, true));
+        if ["--plan", "--shards"].contains(&name) {
+            if !has_value {
+                arguments.next();
+            }
+        } else if verb.iter().any(|before| before == "bake") {
+            options.push(argument);
+        } else {
+            verb.push(argument);
+        }
+    }
+    Ok(Command { verb, options })
+}
+
+/// Returns the report of a job.
+fn job_report(job: Job) -> Report {
+    let shard = match job.scoring {
+        Scoring::Shard(shard) => Some(shard.to_string()),
+        Scoring::Whole | Scoring::Merge(_) => None,
+    };
+    let of_shard = shard.as_ref().map_or(String::new(), |shard| format!(", shard {shard}"));
+    let text = lines(&[("done", format!("{}{of_shard}", job.stage))]);
+    Report::new(json!({ "stage": job.stage, "shard": shard }), text)
 }
 
 /// The options of training, for which a GPU is needed.
@@ -135,14 +226,71 @@ impl Bake {
         self.scoring.check(&self.given, &[self.variant])?;
         let (settings, progress) = (self.settings(self.package.out()?)?, &mut Bars::default());
         settings.check_files()?;
+        let job = self.jobs.job(&self.given, self.is_dataset())?;
+        if let Some(path) = &self.jobs.plan {
+            return self.plan(path, &settings, progress);
+        }
         let (scene, engine) = if self.is_dataset() {
             let engine = self.engine.open(&self.given, &OF_TRAINING)?;
-            self.train(&settings, engine, progress)?
+            self.train(&settings, job, engine, progress)?
         } else {
             (self.checkpoint.load_to_change(&self.input)?, self.engine.open(&self.given, &OF_TRAINING)?)
         };
+        if let Some(job) = job {
+            if job.stage != TRAIN {
+                bake_job(scene, &settings, job, &mut { engine }, progress)?;
+            }
+            return Ok(job_report(job));
+        }
         let Baked { report, html, .. } = bake(scene, &settings, &mut { engine }, progress)?;
         Ok(Report::new(report.json()?, in_short(&report, &html)))
+    }
+
+    /// Writes the bake as jobs.
+    fn plan(&self, path: &Path, settings: &BakeSettings, progress: &mut Bars) -> Result<Report, Failure> {
+        Files::default().reads_scene(&self.input).reads_data(&settings.data).writes(path, "json").check()?;
+        let gpu = match self.engine.choice() {
+            EngineChoice::Gpu => true,
+            EngineChoice::Cpu => false,
+            EngineChoice::Auto => {
+                let message = "a plan is the same on all machines: give --engine gpu or --engine cpu with --plan";
+                return Err(Failure::new(message));
+            }
+        };
+        let directory = env::current_dir()?;
+        let (command, shards) = (planned_command(env::args_os())?, self.jobs.shards.unwrap_or(1));
+        let plan = if self.is_dataset() {
+            if !gpu {
+                return Err(OfflineError::TrainingWithoutGpu.into());
+            }
+            let training = self.training(settings);
+            let source = Source::Pictures(training.start.gaussians, training.tuning.steps);
+            plan(source, settings, gpu, shards, directory, &command, progress)?
+        } else {
+            let scene = self.checkpoint.load_to_change(&self.input)?;
+            let source = Source::Scene(scene.len(), &scene.form, &scene.trained_with);
+            plan(source, settings, gpu, shards, directory, &command, progress)?
+        };
+        let json = serde_json::to_value(&plan)?;
+        let text = format!("{json:#}\n");
+        write_beside(path, |file| file.write_all(text.as_bytes()))?;
+        let seconds: f64 = plan.jobs.iter().map(|job| job.needs.seconds).sum();
+        let names: Vec<&str> = plan.jobs.iter().map(|job| job.id.as_str()).collect();
+        let text = lines(&[
+            ("jobs", format!("{}: {}", names.len(), names.join(", "))),
+            ("time", format!("{seconds:.0} s in all, by estimate")),
+            ("plan", path.display().to_string()),
+        ]);
+        Ok(Report::new(json, text))
+    }
+
+    /// Returns the settings of the training from pictures.
+    fn training(&self, settings: &BakeSettings) -> TrainSettings {
+        let mut training = TrainSettings::usual(settings.data.clone(), settings.splits);
+        training.start.gaussians = self.gaussians.unwrap_or(training.start.gaussians);
+        training.tuning = TrainSettings::tuning(self.train_steps.unwrap_or(TrainSettings::STEPS));
+        training.capture = self.checkpoint.capture();
+        training
     }
 
     /// Returns whether the input is a dataset, from whose pictures a capture is trained.
@@ -174,15 +322,13 @@ impl Bake {
     fn train(
         &self,
         settings: &BakeSettings,
+        job: Option<Job>,
         mut engine: Engine,
         progress: &mut Bars,
     ) -> Result<(GaussianScene, Engine), Failure> {
-        let mut training = TrainSettings::usual(settings.data.clone(), settings.splits);
-        training.start.gaussians = self.gaussians.unwrap_or(training.start.gaussians);
-        training.tuning = TrainSettings::tuning(self.train_steps.unwrap_or(TrainSettings::STEPS));
-        training.capture = self.checkpoint.capture();
         let deferred = interrupt::defer();
-        let scene = train_dataset(&training, &settings.out, &mut engine, progress)?;
+        let only = job.map(|job| job.stage);
+        let scene = train_dataset(&self.training(settings), &settings.out, only, &mut engine, progress)?;
         drop(deferred);
         Ok((scene, engine))
     }
@@ -247,4 +393,21 @@ fn in_short(report: &BakeReport, page: &Path) -> String {
     pairs.push(("time", format!("{seconds:.1} s")));
     pairs.push(("report", page.display().to_string()));
     lines(&pairs)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_of_a_plan_is_this_one_without_the_options_of_the_plan() {
+        let of = |line: &str| planned_command(line.split(' ').map(OsString::from)).expect("text");
+        let words = |line: &str| line.split(' ').map(str::to_owned).collect::<Vec<_>>();
+        let expected =
+            Command { verb: words("gs4d --json bake"), options: words("in.pth --data d --engine cpu -o out.gs4d") };
+        let line = "target/gs4d --json bake in.pth --plan p.json --data d --shards 4 --engine cpu -o out.gs4d";
+        assert_eq!(of(line), expected, "values after the options");
+        let line = "gs4d --json bake --plan=p.json in.pth --data d --engine cpu -o out.gs4d --shards=4";
+        assert_eq!(of(line), expected, "values in the options");
+    }
 }

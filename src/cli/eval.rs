@@ -1,20 +1,22 @@
 //! `gs4d eval SCENE --data DIR`: compares a scene with the views of a dataset.
 //!
 //! In: a scene, a split with its images. Out: the metrics of every view and of all views, over the background of training and over a
-//! contrasting one; with `--out` a picture for each view: reference, render, amplified difference.
+//! contrasting one; with `--out` a picture for each view: reference, render, amplified difference; or the part of one shard of the views.
 
-use super::args::{CheckpointArgs, DesignArgs, EngineArgs, Given, SplitArgs, values};
+use super::args::{CheckpointArgs, DesignArgs, EngineArgs, Given, PART, Portion, ShardArgs, SplitArgs, values};
 use super::failure::Failure;
 use super::progress::Bars;
-use super::report::{Report, switches_json};
+use super::report::{Report, part_report, switches_json};
 use super::table::{Table, lines};
 use crate::offline::convert::require_no_windows;
 use crate::offline::dataset::Split;
 use crate::offline::engine::Engine;
 use crate::offline::evaluation::{color_name, contrast, evaluate_scene, without_contrast};
+use crate::offline::evaluation_parts::{Subject, merge};
 use crate::offline::files::Files;
 use crate::offline::memory_check::{BY_RESOLUTION, Pictures};
 use crate::offline::metrics::{Evaluation, ImageMetrics, MeanMetrics, MetricSet, ViewMetrics, side_by_side};
+use crate::offline::shard::Shard;
 use crate::offline::splits::{SPLIT_NAMES, split_name, subset};
 use crate::offline::{OfflineError, write_png};
 use crate::scene::TemporalFilter;
@@ -34,6 +36,8 @@ Examples:
   gs4d eval capture.gs4d --data data/toybox
   gs4d eval chkpnt30000.pth --data data/standup --resolution 2 --out compared
   gs4d eval capture.gs4d --data data/toybox --split train --views 60 --metrics psnr,ssim --no-filter --json
+  gs4d eval capture.gs4d --data data/toybox --shard 0/2 --out 0.gs4p
+  gs4d eval capture.gs4d --data data/toybox --merge 0.gs4p 1.gs4p
 
 PSNR is the mean of the three channels' (as the original reports it; a channel without any error is left out), pooled that of
 all values together: of a view, and in the last row of all views. PSNR of identical views is 200 dB; they are counted, and left out
@@ -60,7 +64,7 @@ pub(super) struct Eval {
     /// Draw every Gaussian, whatever the temporal filter of the scene says.
     #[arg(long)]
     no_filter: bool,
-    /// Folder for pictures: reference, render and amplified difference side by side.
+    /// Folder for pictures: reference, render and amplified difference side by side; with --shard the part.
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// What differences are multiplied by in those pictures.
@@ -68,6 +72,8 @@ pub(super) struct Eval {
     gain: f32,
     #[command(flatten)]
     design: DesignArgs,
+    #[command(flatten)]
+    shards: ShardArgs,
     #[command(flatten)]
     engine: EngineArgs,
     #[command(flatten)]
@@ -103,8 +109,20 @@ impl Eval {
     /// A scene or views that cannot be used, missing images, pictures that cannot be written, a failure of the engine.
     pub(super) fn run(&self) -> Result<Report, Failure> {
         self.engine.check(&self.given, &OF_DRAWING)?;
+        self.shards.check(&self.given, &["--gain"])?;
         let files = self.data.add_to(Files::default().reads_scene(&self.scene));
-        if let Some(out) = &self.out {
+        let pictures = match self.shards.portion() {
+            Portion::All => self.out.as_deref(),
+            Portion::Shard(_) => {
+                files.clone().writes(self.shards.out(self.out.as_deref())?, PART).check()?;
+                None
+            }
+            Portion::Parts(_) => {
+                self.given.none_of(&["--out", "--gain"], "with --merge, which draws no pictures")?;
+                None
+            }
+        };
+        if let Some(out) = pictures {
             files.clone().writes_folder(out, []).check()?;
         }
         let progress = &mut Bars::default();
@@ -120,8 +138,8 @@ impl Eval {
         dataset.require_images()?;
         let metrics = metric_set(&self.metrics);
         let mut engine = self.engine.open(&self.given, &OF_DRAWING)?;
-        Pictures::evaluated(&dataset.views, metrics, self.out.is_some()).require(engine.headless(), BY_RESOLUTION)?;
-        if let Some(out) = &self.out {
+        Pictures::evaluated(&dataset.views, metrics, pictures.is_some()).require(engine.headless(), BY_RESOLUTION)?;
+        if let Some(out) = pictures {
             let pictures = dataset.views.iter().map(|view| picture_of(out, &view.name));
             files.writes_folder(out, pictures).check()?;
             fs::create_dir_all(out).map_err(|error| Failure::at(out, &error))?;
@@ -133,13 +151,26 @@ impl Eval {
 
         let start = Instant::now();
         let seen = |view: &ViewMetrics, reference: &Picture, render: &Picture| -> Result<(), OfflineError> {
-            let Some(out) = &self.out else { return Ok(()) };
+            let Some(out) = pictures else { return Ok(()) };
             let (path, picture) = (picture_of(out, &view.name), side_by_side(reference, render, self.gain));
             Ok(write_png(&path, &picture)?)
         };
         let views = &dataset.views;
-        let mut evaluation = evaluate_scene(&mut engine, &scene, views, background, metrics, progress, seen)?;
-        evaluation.contrast = contrast(&mut engine, &scene, views, background, &evaluation, progress)?;
+        let subject = Subject { input: &self.scene, scene: &scene, views, background, metrics };
+        let evaluation = match self.shards.portion() {
+            Portion::All => {
+                let mut evaluation = evaluate_scene(&mut engine, &scene, views, background, metrics, progress, seen)?;
+                evaluation.contrast = contrast(&mut engine, &scene, views, background, &evaluation, progress)?;
+                evaluation
+            }
+            Portion::Shard(shard) => {
+                let out = self.shards.out(self.out.as_deref())?;
+                let written = subject.write_part(out, &subject.label(&engine, shard)?, &mut engine, progress)?;
+                let work = written.then(|| (start.elapsed().as_secs_f64(), engine.name()));
+                return Ok(part_report(shard, out, work));
+            }
+            Portion::Parts(paths) => merge(paths, &subject.label(&engine, Shard::WHOLE)?, views.len())?,
+        };
         let seconds = start.elapsed().as_secs_f64();
 
         let (split, engine) = (split_name(dataset.split), engine.name());
@@ -163,7 +194,7 @@ impl Eval {
             "background": evaluation.background,
             "has_gaps": evaluation.has_gaps,
             "contrast": evaluation.contrast,
-            "out": self.out.as_ref().map(|out| out.display().to_string()),
+            "out": pictures.map(|out| out.display().to_string()),
             "engine": engine,
             "seconds": seconds,
             "switches": switches_json(&scene.trained_with, &scene.playback),

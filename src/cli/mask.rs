@@ -1,21 +1,26 @@
 //! `gs4d mask IN -o OUT`: adds a temporal filter to a scene.
 //!
 //! In: a scene, a number of key-frames, training views if the filter needs them. Out: a package with the filter, and a
-//! report with the share of active Gaussians.
+//! report with the share of active Gaussians; or the part of one shard of the views.
 
-use super::args::{CheckpointArgs, DataArgs, EngineArgs, Given, PackageArgs, values};
+use super::args::{CheckpointArgs, DataArgs, EngineArgs, Given, PART, PackageArgs, Portion, ShardArgs, values};
 use super::failure::Failure;
 use super::progress::Bars;
-use super::report::Report;
+use super::report::{Report, part_report};
 use super::table::{bytes, lines};
+use crate::offline::OfflineError;
 use crate::offline::convert::require_no_windows;
 use crate::offline::dataset::TrainingView;
 use crate::offline::engine::Engine;
 use crate::offline::files::Files;
-use crate::offline::temporal_filter::{FILTER_NAMES, filter, filter_name, needs_views, neighbor_overlap};
+use crate::offline::shard::Shard;
+use crate::offline::temporal_filter::{
+    FILTER_NAMES, filter, filter_name, label, merge, needs_views, neighbor_overlap, write_part,
+};
 use crate::scene::{ActiveSets, FilterKind, MAX_SEGMENTS, TemporalFilter};
 use serde_json::json;
 use std::path::PathBuf;
+use std::time::Instant;
 
 /// Add a temporal filter: the Gaussians that are active in each segment of time. Drawing skips the other Gaussians.
 #[derive(clap::Args)]
@@ -24,6 +29,8 @@ Examples:
   gs4d mask chkpnt30000.pth -o filtered.gs4d
   gs4d mask chkpnt30000.pth --filter interval --data data/toybox --key-frames 11 -o filtered.gs4d
   gs4d mask n3v.pth --filter key-frame --data data/n3v --every 20 -o filtered.gs4d
+  gs4d mask n3v.pth --filter interval --data data/n3v --shard 0/2 -o 0.gs4p
+  gs4d mask n3v.pth -o filtered.gs4d --filter interval --data data/n3v --merge 0.gs4p 1.gs4p
 
 Filters:
   support    Gaussians whose opacity can be visible in the segment. Changes no pixel and needs no views.
@@ -50,6 +57,8 @@ pub(super) struct Mask {
     #[command(flatten)]
     data: DataArgs,
     #[command(flatten)]
+    shards: ShardArgs,
+    #[command(flatten)]
     engine: EngineArgs,
     #[command(flatten)]
     checkpoint: CheckpointArgs,
@@ -63,7 +72,15 @@ impl Mask {
     /// engine.
     pub(super) fn run(&self) -> Result<Report, Failure> {
         self.check_options()?;
-        let out = self.package.checked_out(self.data.add_to(Files::default().reads_scene(&self.input)))?;
+        let files = self.data.add_to(Files::default().reads_scene(&self.input)).reads(self.shards.parts());
+        let out = match self.shards.portion() {
+            Portion::Shard(_) => {
+                let out = self.package.out()?;
+                files.writes(out, PART).check()?;
+                out
+            }
+            Portion::All | Portion::Parts(_) => self.package.checked_out(files)?,
+        };
         let mut scene = self.checkpoint.load_to_change(&self.input)?;
         let no_windows = require_no_windows(scene.filter.as_ref(), "another filter");
         no_windows.map_err(|error| Failure::at(&self.input, &error))?;
@@ -76,8 +93,22 @@ impl Mask {
         };
         let keys = self.keys(&views)?;
         let mut engine = if by_views { self.engine.open(&self.given, &[])? } else { Engine::Cpu };
-        let filter = filter(&mut engine, &scene, self.filter, keys, &views, &mut Bars::default());
-        let filter = filter.map_err(|error| Failure::at(&self.input, &error))?;
+        let (kind, progress) = (self.filter, &mut Bars::default());
+        let about_input = |error: OfflineError| Failure::at(&self.input, &error);
+        let filter = match self.shards.portion() {
+            Portion::All => filter(&mut engine, &scene, kind, keys, &views, progress).map_err(about_input)?,
+            Portion::Shard(shard) => {
+                let start = Instant::now();
+                let label = label(&self.input, &scene, kind, keys, &views, &engine, shard)?;
+                let written = write_part(out, &label, &mut engine, &scene, kind, keys, &views, progress);
+                let work = written.map_err(about_input)?.then(|| (start.elapsed().as_secs_f64(), engine.name()));
+                return Ok(part_report(shard, out, work));
+            }
+            Portion::Parts(paths) => {
+                let label = label(&self.input, &scene, kind, keys, &views, &engine, Shard::WHOLE)?;
+                merge(paths, &label, kind, keys, scene.len())?
+            }
+        };
         let (share, overlap) = (filter.active_share(), neighbor_overlap(&filter));
         let least = overlap.iter().copied().fold(1.0, f64::min);
         let mean = if overlap.is_empty() { 1.0 } else { overlap.iter().sum::<f64>() / overlap.len() as f64 };
@@ -116,7 +147,7 @@ impl Mask {
             return Ok(());
         }
         let name = filter_name(self.filter);
-        let drawn = ["--size", "--resolution", "--engine", "--adapter", "--checks"];
+        let drawn = ["--size", "--resolution", "--engine", "--adapter", "--checks", "--shard", "--merge"];
         self.given.none_of(&drawn, &format!("with --filter {name}: no view is drawn"))?;
         match self.every {
             Some(_) => Ok(()),

@@ -5,12 +5,15 @@
 use super::failure::Failure;
 use super::note::note;
 use super::plain;
+use super::table::lines;
 use crate::codec::checkpoint::options::describe;
 use crate::offline::OfflineError;
+use crate::offline::shard::Shard;
 use crate::offline::unfinished::Existing;
 use crate::scene::{PlaybackHints, TrainedWith};
 use serde_json::{Value, json};
 use std::io::{ErrorKind, Write, stdout};
+use std::path::Path;
 
 /// The result of a verb.
 pub(super) struct Report {
@@ -72,6 +75,26 @@ impl Report {
             _ => Ok(()),
         }
     }
+}
+
+/// Returns the report of a part that a verb has written to `out`. `work` is the number of seconds that it took, and the name of the engine;
+/// `None` if the part was there.
+pub(super) fn part_report(shard: Shard, out: &Path, work: Option<(f64, String)>) -> Report {
+    let done = match &work {
+        Some((seconds, engine)) => format!("in {seconds:.1} s on {engine}"),
+        None => "there already, with the same inputs".to_owned(),
+    };
+    let text = lines(&[("shard", shard.to_string()), ("done", done), ("part", out.display().to_string())]);
+    let was_there = work.is_none();
+    let (seconds, engine) = work.unzip();
+    let json = json!({
+        "shard": shard.to_string(),
+        "out": out.display().to_string(),
+        "was_there": was_there,
+        "seconds": seconds,
+        "engine": engine,
+    });
+    Report::new(json, text)
 }
 
 /// Returns the training and playback settings of a scene, for people.

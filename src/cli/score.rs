@@ -1,20 +1,24 @@
 //! `gs4d score CHECKPOINT --data DIR`: scores each Gaussian over the training views.
 //!
-//! In: a checkpoint, cameras and times. Out: a file of one float32 for each Gaussian, or a folder with a file for each
-//! score.
+//! In: a checkpoint, cameras and times; or the parts of all shards. Out: a file of one float32 for each Gaussian, or a folder with a file for
+//! each score; or the part of one shard.
 
-use super::args::{CheckpointArgs, DataArgs, EngineArgs, Given, ScoringArgs, ValidationArgs, score_choice, values};
+use super::args::{
+    CheckpointArgs, DataArgs, EngineArgs, Given, PART, Portion, ScoringArgs, ShardArgs, ValidationArgs, score_choice,
+    values,
+};
 use super::failure::Failure;
 use super::progress::Bars;
-use super::report::Report;
+use super::report::{Report, part_report};
 use super::table::{Table, lines};
 use crate::offline::Subject;
 use crate::offline::belonging::require_belonging;
+use crate::offline::engine::Engine;
 use crate::offline::files::Files;
 use crate::offline::memory_check::{BY_RESOLUTION, Pictures};
-use crate::offline::score::Variant;
-use crate::offline::score::write_scores;
+use crate::offline::score::{Scores, Variant, parts, write_scores};
 use crate::offline::search::{Candidate, Goal, ScoreChoice, ScoreSearch, SearchSummary, candidates};
+use crate::offline::shard::Shard;
 use crate::scene::GaussianScene;
 use serde_json::json;
 use std::fs;
@@ -30,6 +34,8 @@ Examples:
   gs4d score chkpnt30000.pth --data data/toybox --out energy.f32 --variant energy
   gs4d score chkpnt30000.pth --data data/standup --resolution 2 --out scores --variant all
   gs4d score chkpnt30000.pth --data data/toybox --out best.f32 --ratio 0.5 --views 200
+  gs4d score chkpnt30000.pth --data data/toybox --variant energy --shard 0/4 --out 0.gs4p
+  gs4d score --variant energy --merge 0.gs4p 1.gs4p 2.gs4p 3.gs4p --out energy.f32
 
 Scores are little-endian float32 in the checkpoint's order, the more the better. `auto` prunes by ours (energy, removal,
 energy-removal) and by the paper's (full), draws the validation views, which are not scored, and keeps the best.")]
@@ -37,9 +43,9 @@ pub(super) struct Score {
     #[command(flatten)]
     given: Given,
     /// The checkpoint, or a package of it in the trained form.
-    #[arg(value_name = "CHECKPOINT")]
-    input: PathBuf,
-    /// The file of scores to write; with --variant all a folder, made if it is not there, for one file each.
+    #[arg(value_name = "CHECKPOINT", required_unless_present = "merge")]
+    input: Option<PathBuf>,
+    /// The file of scores to write; with --variant all a folder, made if it is not there, for one file each; with --shard the part.
     #[arg(short, long, value_name = "OUT")]
     out: PathBuf,
     /// Which score.
@@ -53,12 +59,27 @@ pub(super) struct Score {
     #[command(flatten)]
     validation: ValidationArgs,
     #[command(flatten)]
+    shards: ShardArgs,
+    #[command(flatten)]
     scoring: ScoringArgs,
     #[command(flatten)]
     engine: EngineArgs,
     #[command(flatten)]
     checkpoint: CheckpointArgs,
 }
+
+/// The options, beside those of checkpoints, that have an effect on scoring alone, and not on parts.
+const OF_SCORING: [&str; 9] = [
+    "--data",
+    "--size",
+    "--resolution",
+    "--views",
+    "--volume-power",
+    "--volume-rank",
+    "--engine",
+    "--adapter",
+    "--checks",
+];
 
 impl Score {
     /// Scores and writes.
@@ -71,8 +92,11 @@ impl Score {
             return Err(Failure::about(&self.out, "is a folder: name a file, or give --variant all"));
         }
         self.files().check()?;
+        let Some(input) = &self.input else {
+            return self.report(&parts::merge(self.shards.parts(), None)?, None, None);
+        };
         let progress = &mut Bars::default();
-        let scene = self.checkpoint.load(&self.input)?;
+        let scene = self.checkpoint.load(input)?;
         let (auto, scoring) = (self.variant == ScoreChoice::Auto, self.scoring.settings());
         let (scored, validation) = if auto {
             let splits = self.data.divide(self.validation, &scene.trained_with, progress)?;
@@ -80,45 +104,70 @@ impl Score {
         } else {
             (self.data.open(&scene.trained_with, progress)?, Vec::new())
         };
-        let subject = Subject::new(&self.input, scene, self.checkpoint.background)?;
+        let subject = Subject::new(input, scene, self.checkpoint.background)?;
         let mut engine = self.engine.open(&self.given, &[])?;
+        let label = |engine: &Engine, shard| parts::label(input, &subject, &scored, &scoring, engine, shard);
         let start = Instant::now();
+        if let Portion::Shard(shard) = self.shards.portion() {
+            let label = label(&engine, shard)?;
+            let written = parts::write(&self.out, &label, &scoring, &mut engine, &subject, &scored, progress)?;
+            let work = written.then(|| (start.elapsed().as_secs_f64(), engine.name()));
+            return Ok(part_report(shard, &self.out, work));
+        }
         Pictures::compared(&validation).require(engine.headless(), BY_RESOLUTION)?;
         if auto && !self.validation.trust_images {
             require_belonging(&mut engine, &subject.runtime, &validation, subject.background)?;
         }
-        let (scores, views) = scoring.scores(&mut engine, &subject, &scored, progress)?;
+        let scores = match self.shards.portion() {
+            Portion::Parts(paths) => parts::merge(paths, Some(&label(&engine, Shard::WHOLE)?))?,
+            Portion::All | Portion::Shard(_) => scoring.scores(&mut engine, &subject, &scored, progress)?,
+        };
         let seconds = start.elapsed().as_secs_f64();
-        let total = subject.scene.len();
-        let mut found = candidates(self.variant, &scores)?;
-        let (mut table, mut summary) = (String::new(), None);
+        let mut best = None;
         if auto {
             let Subject { runtime, background, .. } = subject;
             let search = ScoreSearch::open(&mut engine, &validation, &runtime, background, false, progress)?;
-            let whole = GaussianScene::from(runtime);
+            let (whole, found) = (GaussianScene::from(runtime), candidates(self.variant, &scores)?);
             let outcome = search.best(&mut engine, &whole, found, Goal::Remove(self.ratio), progress)?;
-            let in_short = search.summary(outcome.outcomes);
-            table = format!("\n{}best: {}\n", search_table(&in_short), outcome.candidate.name);
-            summary = Some(in_short);
-            found = vec![outcome.candidate];
+            best = Some((outcome.candidate, search.summary(outcome.outcomes)));
         }
+        self.report(&scores, best, Some((seconds, engine.name())))
+    }
+
+    /// Writes the scores, of the best candidate alone if there is one. `work` is how long the scoring took, and the name of the engine.
+    fn report(
+        &self,
+        scores: &Scores,
+        best: Option<(Candidate, SearchSummary)>,
+        work: Option<(f64, String)>,
+    ) -> Result<Report, Failure> {
+        let (found, table, summary) = match best {
+            Some((best, summary)) => {
+                let table = format!("\n{}best: {}\n", search_table(&summary), best.name);
+                (vec![best], table, Some(summary))
+            }
+            None => (candidates(self.variant, scores)?, String::new(), None),
+        };
         let files = self.write(&found)?;
         let names: Vec<&str> = found.iter().map(|candidate| candidate.name.as_str()).collect();
+        let (total, views) = (scores.len(), scores.views());
+        let took = work.as_ref().map_or(String::new(), |(seconds, engine)| format!(" in {seconds:.1} s on {engine}"));
         let text = lines(&[
             ("scored", format!("{total} Gaussians, {} of which contribute", scores.contributing())),
-            ("views", format!("{views} in {seconds:.1} s on {}", engine.name())),
+            ("views", format!("{views}{took}")),
             ("scores", names.join(", ")),
             ("written", self.out.display().to_string()),
         ]) + &table;
+        let (seconds, engine) = work.unzip();
         let json = json!({
-            "in": self.input.display().to_string(),
+            "in": self.input.as_ref().map(|input| input.display().to_string()),
             "files": files,
             "scores": names,
             "gaussians": total,
             "contributing": scores.contributing(),
             "views": views,
             "seconds": seconds,
-            "engine": engine.name(),
+            "engine": engine,
             "contest": summary,
         });
         Ok(Report::new(json, text))
@@ -128,6 +177,16 @@ impl Score {
     fn check_options(&self) -> Result<(), Failure> {
         self.engine.check(&self.given, &[])?;
         self.scoring.check(&self.given, &[self.variant])?;
+        self.shards.check(&self.given, &["--ratio", "--trust-images"])?;
+        if self.input.is_none() {
+            if self.variant == ScoreChoice::Auto {
+                let message =
+                    "auto draws views to compare scores: give the CHECKPOINT and --data, too, or another --variant";
+                return Err(Failure::new(message));
+            }
+            let reason = "on parts alone: it is checked if the CHECKPOINT is given, too";
+            self.given.none_of(&[&OF_SCORING[..], &CheckpointArgs::OF_CHECKPOINTS].concat(), reason)?;
+        }
         match self.variant {
             ScoreChoice::Auto => Ok(()),
             ScoreChoice::All | ScoreChoice::One(_) => {
@@ -139,7 +198,11 @@ impl Score {
 
     /// Returns the files that are read and those that may be written.
     fn files(&self) -> Files {
-        let files = self.data.add_to(Files::default().reads_scene(&self.input));
+        let files = self.input.iter().fold(Files::default(), |files, input| files.reads_scene(input));
+        let files = self.data.add_to(files).reads(self.shards.parts());
+        if let Portion::Shard(_) = self.shards.portion() {
+            return files.writes(&self.out, PART);
+        }
         match self.variant {
             ScoreChoice::All => files.writes_folder(&self.out, Variant::ALL.map(|variant| self.path(variant.name()))),
             ScoreChoice::Auto | ScoreChoice::One(_) => files.writes(&self.out, "f32"),

@@ -81,7 +81,7 @@ pub fn ablate(
     if ratios.is_empty() || scores.is_empty() {
         return Ok(table.rows);
     }
-    let (found, _) = scoring.scores(table.engine, &subject, &train, progress)?;
+    let found = scoring.scores(table.engine, &subject, &train, progress)?;
     drop(subject.scene);
     let variants = variants(scores, found.has_volume()).into_iter();
     let scores = variants.map(|variant| found.of(variant).map(|scores| (variant, scores)));

@@ -99,6 +99,14 @@ impl Engine {
         }
     }
 
+    /// Returns `cpu` or `gpu`.
+    pub(crate) fn kind(&self) -> &'static str {
+        match self {
+            Self::Cpu => "cpu",
+            Self::Gpu(_) => "gpu",
+        }
+    }
+
     /// Returns a readable description: the CPU and its threads, or the adapter.
     pub fn name(&self) -> String {
         match self {

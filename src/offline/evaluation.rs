@@ -62,14 +62,27 @@ pub fn contrast(
     evaluation: &Evaluation,
     progress: &mut dyn Progress,
 ) -> Result<Option<Contrast>, OfflineError> {
-    let Background::Color(color) = background else { return Ok(None) };
     if !evaluation.has_gaps {
         return Ok(None);
     }
-    let color = contrasting(color);
-    let background = Background::Color(color);
-    let over = evaluate_scene(engine, scene, views, background, MetricSet::PSNR, progress, |_, _, _| Ok(()))?;
-    Ok(Some(Contrast { background: color, mean: over.mean }))
+    let over = evaluate_over_contrast(engine, scene, views, background, progress)?;
+    Ok(over.map(|Evaluation { background, mean, .. }| Contrast { background, mean }))
+}
+
+/// Evaluates the scene over the color that contrasts with `background`; `None` if that is an environment map. Begins the task "comparing".
+///
+/// # Errors
+/// The errors of [`evaluate_scene`].
+pub(crate) fn evaluate_over_contrast(
+    engine: &mut Engine,
+    scene: &RuntimeScene,
+    views: &[TrainingView],
+    background: Background,
+    progress: &mut dyn Progress,
+) -> Result<Option<Evaluation>, OfflineError> {
+    let Background::Color(color) = background else { return Ok(None) };
+    let background = Background::Color(contrasting(color));
+    evaluate_scene(engine, scene, views, background, MetricSet::PSNR, progress, |_, _, _| Ok(())).map(Some)
 }
 
 /// Returns white for a color whose luminance is below 0.5, else black.

@@ -13,7 +13,7 @@
 //! | [`score`] | sums what every Gaussian contributes to the training views |
 //! | `prune`, [`prune_by_views`] | keeps the Gaussians of the highest scores |
 //! | `search`, `trained_search`, `quality` | finds the best score and the smallest count that a loss allows |
-//! | `temporal_filter` | finds the active Gaussians of each segment of time |
+//! | `temporal_filter`, `seen` | find the active Gaussians of each segment of time |
 //! | [`fine_tune`](mod@fine_tune) | trains the remaining Gaussians, to compensate for the removed Gaussians |
 //! | `train` | trains a capture from nothing but pictures |
 //! | [`quantize`], [`convert`] | changes the form that a scene is stored in |
@@ -24,6 +24,7 @@
 //! | [`ablation`] | tabulates the loss by every score, ratio and filter |
 //! | `shaders`, `layout` | compose the passes of scoring and training, and mirror their structures |
 //! | `files` | refuses outputs that are inputs or cannot be written, before anything is computed |
+//! | `shard` | divides work among machines, and puts their parts together |
 //! | `stages`, `store`, `stored` | run stages and keep their results, from which interrupted work resumes |
 //! | `names` | the names of files that are copies of files elsewhere |
 //! | `unfinished` | lists the files and folders that are removed if a process ends before its work |
@@ -40,6 +41,7 @@ pub mod detail;
 pub mod engine;
 mod error;
 pub(crate) mod evaluation;
+pub(crate) mod evaluation_parts;
 pub(crate) mod export;
 pub(crate) mod fidelity;
 pub(crate) mod files;
@@ -62,7 +64,9 @@ pub mod report;
 mod save;
 pub mod score;
 pub(crate) mod search;
+pub(crate) mod seen;
 pub(crate) mod shaders;
+pub(crate) mod shard;
 pub(crate) mod sliced;
 pub(crate) mod splits;
 pub(crate) mod stages;

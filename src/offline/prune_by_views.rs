@@ -75,7 +75,7 @@ pub fn prune_by_views(
         (None, compared) => {
             let all = if compared { None } else { Some(splits.all_training(&runtime.trained_with, progress)?) };
             let views = all.as_ref().unwrap_or(&splits.train);
-            candidates(settings.score, &settings.scoring.scores(engine, &subject, views, progress)?.0)?
+            candidates(settings.score, &settings.scoring.scores(engine, &subject, views, progress)?)?
         }
     };
     let Subject { scene, runtime, .. } = subject;

@@ -5,7 +5,7 @@
 //! each. Loading, storing and cancelling are here and nowhere else.
 
 use super::report::StageTime;
-use super::store::{Key, Store};
+use super::store::{Key, Reserved, Store};
 use super::stored::Stored;
 use super::{OfflineError, Progress, proceed};
 use std::time::Instant;
@@ -15,13 +15,56 @@ pub(crate) struct Stages<'a> {
     store: &'a Store,
     progress: &'a mut dyn Progress,
     times: Vec<StageTime>,
+    only: Option<Only>,
+}
+
+/// The only stage that may run.
+#[derive(Debug, Clone, Copy)]
+struct Only {
+    stage: &'static str,
+    /// Whether it has run, or been skipped or left out.
+    is_reached: bool,
+    /// Whether stages before it run again.
+    again: bool,
 }
 
 impl<'a> Stages<'a> {
     /// Begins a task of this many stages.
     pub(crate) fn begin(task: &'static str, count: usize, store: &'a Store, progress: &'a mut dyn Progress) -> Self {
         progress.begin(task, count);
-        Self { store, progress, times: Vec::new() }
+        Self { store, progress, times: Vec::new(), only: None }
+    }
+
+    /// Lets only this stage run: results of stages before it must be stored. The folder is one for runs of single stages.
+    pub(crate) fn only(mut self, stage: Option<&'static str>) -> Self {
+        self.only = stage.map(|stage| Only { stage, is_reached: false, again: false });
+        self
+    }
+
+    /// Returns whether the only stage is done.
+    pub(crate) fn is_reached(&self) -> bool {
+        self.only.is_some_and(|only| only.is_reached)
+    }
+
+    /// Lets the stages before the only stage run again, with other inputs.
+    pub(crate) fn again(&mut self) {
+        if let Some(only) = &mut self.only {
+            (only.again, only.is_reached) = (true, false);
+        }
+    }
+
+    /// Checks that a stage whose result is not stored may run. Waits until no other run works on it.
+    fn begin_stage(&mut self, name: &'static str, part: &str) -> Result<Option<Reserved>, OfflineError> {
+        match self.only {
+            Some(Only { stage, again: false, .. }) if stage != name => {
+                let message = format!(
+                    "has no result of the stage {name} with these inputs: run --only {name} before --only {stage}"
+                );
+                Err(OfflineError::at(self.store.folder(), message))
+            }
+            Some(_) => self.store.reserve(part, self.progress).map(Some),
+            None => Ok(None),
+        }
     }
 
     /// Returns the result of a stage with these inputs: the stored one, or else that of `work`, which is stored under the
@@ -37,21 +80,44 @@ impl<'a> Stages<'a> {
         fits: impl Fn(&T) -> bool,
         work: impl FnOnce(&mut dyn Progress) -> Result<T, OfflineError>,
     ) -> Result<(T, Key), OfflineError> {
+        self.run_part(name, name, inputs, fits, work)
+    }
+
+    /// Returns the result of a part of a stage, which is stored under the name of the part, as by [`run`](Self::run).
+    ///
+    /// # Errors
+    /// As [`run`](Self::run).
+    pub(crate) fn run_part<T: Stored>(
+        &mut self,
+        stage: &'static str,
+        part: &str,
+        inputs: Key,
+        fits: impl Fn(&T) -> bool,
+        work: impl FnOnce(&mut dyn Progress) -> Result<T, OfflineError>,
+    ) -> Result<(T, Key), OfflineError> {
         let start = Instant::now();
-        let stored = self.store.load(name, inputs).and_then(|body| Some((T::decode(&body)?, Key::of(&body))));
-        let stored = stored.filter(|(result, _)| fits(result));
+        let store = self.store;
+        let load = || store.load(part, inputs).and_then(|body| Some((T::decode(&body)?, Key::of(&body))));
+        let load = || load().filter(|(result, _)| fits(result));
+        let (mut stored, mut reserved) = (load(), None);
+        if stored.is_none() {
+            reserved = self.begin_stage(stage, part)?;
+            // Another run may have ended meanwhile.
+            stored = reserved.as_ref().and_then(|_| load());
+        }
         let skipped = stored.is_some();
         let result = match stored {
             Some(stored) => stored,
             None => {
                 proceed(self.progress)?;
                 let body = work(self.progress)?.encode()?;
-                let result = T::decode(&body).ok_or(OfflineError::Unreadable { stage: name })?;
-                self.store.store(name, inputs, &body)?;
+                let result = T::decode(&body).ok_or(OfflineError::Unreadable { stage })?;
+                self.store.store(part, inputs, &body)?;
                 (result, Key::of(&body))
             }
         };
-        self.ended(name, start, skipped);
+        drop(reserved);
+        self.ended(stage, start, skipped);
         Ok(result)
     }
 
@@ -64,6 +130,7 @@ impl<'a> Stages<'a> {
         name: &'static str,
         work: impl FnOnce(&mut dyn Progress) -> Result<T, OfflineError>,
     ) -> Result<T, OfflineError> {
+        let _reserved = self.only.map(|_| self.store.reserve(name, self.progress)).transpose()?;
         proceed(self.progress)?;
         let start = Instant::now();
         let result = work(self.progress)?;
@@ -76,7 +143,7 @@ impl<'a> Stages<'a> {
         if let Some(reason) = reason {
             self.progress.note(&format!("note: {name} is left out: {reason}"));
         }
-        self.progress.advance();
+        self.pass(name);
     }
 
     /// Returns where progress is reported.
@@ -99,6 +166,13 @@ impl<'a> Stages<'a> {
         let duration = if skipped { "skipped, done before".to_owned() } else { format!("{seconds:.1} s") };
         self.progress.note(&format!("{name}: {duration}"));
         self.times.push(StageTime { name: name.to_owned(), seconds, skipped });
+        self.pass(name);
+    }
+
+    fn pass(&mut self, name: &str) {
+        if let Some(only) = &mut self.only {
+            only.is_reached |= only.stage == name;
+        }
         self.progress.advance();
     }
 }
@@ -144,6 +218,28 @@ mod tests {
         assert_eq!(run(b"first"), 1, "nothing is stored");
         assert_eq!(run(b"first"), 0, "the stored result has the same inputs");
         assert_eq!(run(b"second"), 1, "the stored result has other inputs");
+    }
+
+    #[test]
+    fn an_only_stage_needs_the_results_of_those_before_it() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let out = folder.path().join("scene.gs4d");
+        let run = |only: &'static str| {
+            let (store, mut progress) = (Store::shared(&out, ".bake").expect("the folder can be made"), NoProgress);
+            let mut stages = Stages::begin("test", 2, &store, &mut progress).only(Some(only));
+            for name in ["first", "second"] {
+                stages.run(name, Key::of(b""), |_| true, |_| Ok(name.as_bytes().to_vec()))?;
+                if stages.is_reached() {
+                    return Ok(name);
+                }
+            }
+            Err(OfflineError::NoScore)
+        };
+        let message = run("second").expect_err("the first stage has not run").to_string();
+        assert!(message.contains("scene.gs4d.bake: has no result of the stage first"), "what is missing: {message}");
+        for only in ["first", "second", "first"] {
+            assert_eq!(run(only).ok(), Some(only), "the run ends after the only stage");
+        }
     }
 
     #[test]

@@ -1,18 +1,22 @@
 //! The folder of intermediate results, from which interrupted work resumes.
 //!
 //! In: a [`Key`] of everything that a result depends on, and the result as bytes. Out: the same bytes; `None`, so that
-//! the stage runs again, if the key is another or the bytes are damaged. One run at a time works in a folder.
+//! the stage runs again, if the key is another or the bytes are damaged. One run at a time works in a folder, or any number of runs of single
+//! stages, of which one at a time works on a stage.
 
 use super::dataset::{Correction, TrainingView};
 use super::files::node;
 use super::temporary_file;
 use crate::codec::CodecError;
-use crate::offline::{unfinished, write_beside};
+use crate::offline::{OfflineError, Progress, proceed, unfinished, write_beside};
 use rayon::prelude::*;
+use std::fmt;
 use std::fs::{self, File, TryLockError};
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::thread;
+use std::time::Duration;
 
 /// The endings of folders of intermediate results, after the name of the output: those of a bake and of fine-tuning.
 pub(crate) const WORK_ENDINGS: [&str; 2] = [".bake", ".tune"];
@@ -30,6 +34,10 @@ const HEAD: usize = 8 + 2 * HASH;
 const LOCK: &str = "lock";
 /// Most attempts to lock it while runs that end remove it.
 const ATTEMPTS: usize = 100;
+/// Time between two attempts to lock it beside other runs.
+const MOMENT: Duration = Duration::from_millis(2);
+/// Time between two looks whether another run still works on a stage.
+const WAIT: Duration = Duration::from_millis(20);
 
 /// The identity of everything that a result depends on: a BLAKE3 hash of the contents of files, results and settings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -69,6 +77,14 @@ impl Key {
         Ok(hashes.into_iter().chain(corrected).fold(Self::of(b"images"), Self::with))
     }
 
+    /// Returns the key of the names, cameras and times of these views, wherever their folder is.
+    pub fn of_views(views: &[TrainingView]) -> Self {
+        let of = |view: &TrainingView| {
+            Self::of(format!("{} {:?} {} {:?}", view.name, view.camera, view.time, view.original).as_bytes())
+        };
+        views.iter().map(of).fold(Self::of(b"views"), Self::with)
+    }
+
     /// Returns the key of the contents of a file: that of its bytes.
     ///
     /// # Errors
@@ -96,17 +112,32 @@ impl Key {
     }
 }
 
-/// The folder of intermediate results, for one run alone. Once the last clone is dropped, another run can work in it; if
-/// nothing is stored, the folder is removed then.
+/// The first 16 digits of the hash, for people and for comparisons of files that were not made to be confused.
+impl fmt::Display for Key {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.iter().take(8).try_for_each(|byte| write!(f, "{byte:02x}"))
+    }
+}
+
+/// The folder of intermediate results, for one run alone or for runs of single stages. Once the last clone is dropped, another run can work
+/// in it; if nothing is stored, the folder is removed then.
 #[derive(Debug, Clone)]
 pub struct Store(Arc<Held>);
 
-/// A folder in which no other run works.
+/// A folder in which no other run works, or runs of single stages alone.
 #[derive(Debug)]
 struct Held {
     folder: PathBuf,
+    users: Users,
     /// The file [`LOCK`]; `None` once the folder is released.
     lock: Option<File>,
+}
+
+/// Who works in a folder, or on a stage.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Users {
+    One,
+    Many,
 }
 
 impl Store {
@@ -116,19 +147,55 @@ impl Store {
     /// # Errors
     /// Another run works in the folder, or it cannot be created.
     pub fn beside(out: &Path, ending: &str) -> Result<Self, CodecError> {
+        Self::open(out, ending, Users::One)
+    }
+
+    /// Returns the folder as [`beside`](Self::beside), for a run of a single stage, beside others of that kind.
+    ///
+    /// # Errors
+    /// A run that needs the folder alone works in it, or it cannot be created.
+    pub(crate) fn shared(out: &Path, ending: &str) -> Result<Self, CodecError> {
+        Self::open(out, ending, Users::Many)
+    }
+
+    fn open(out: &Path, ending: &str, users: Users) -> Result<Self, CodecError> {
         let mut name = out.file_name().unwrap_or_default().to_owned();
         name.push(ending);
         let folder = out.with_file_name(name);
         let mut unfinished = unfinished::lock();
-        match lock(&folder) {
+        match lock(&folder, users) {
             Ok(lock) => {
-                unfinished.add_file(&folder.join(LOCK));
+                if users == Users::One {
+                    unfinished.add_file(&folder.join(LOCK));
+                }
                 unfinished.add_folder(&folder);
                 drop(unfinished);
                 temporary_file::remove_stale(&folder);
-                Ok(Self(Arc::new(Held { folder, lock: Some(lock) })))
+                Ok(Self(Arc::new(Held { folder, users, lock: Some(lock) })))
             }
             Err(error) => Err(CodecError { path: folder, kind: error.into() }),
+        }
+    }
+
+    /// Waits until no other run works on a stage.
+    ///
+    /// # Errors
+    /// The folder cannot be written to, [`OfflineError::Interrupted`] if the user has asked to end.
+    pub(crate) fn reserve(&self, stage: &str, progress: &mut dyn Progress) -> Result<Reserved, OfflineError> {
+        let path = self.folder().join(format!("{stage}.{LOCK}"));
+        let mut waits = false;
+        loop {
+            match lock_file(&path, Users::One) {
+                Ok(Some(file)) => return Ok(Reserved { path, file: Some(file) }),
+                Ok(None) => {}
+                Err(error) => return Err(OfflineError::at(&path, error)),
+            }
+            if !waits {
+                progress.note(&format!("{stage}: another run works on it: waiting for its result"));
+                waits = true;
+            }
+            proceed(progress)?;
+            thread::sleep(WAIT);
         }
     }
 
@@ -168,8 +235,27 @@ impl Store {
     }
 }
 
+/// A stage on which no other run works.
+#[derive(Debug)]
+pub(crate) struct Reserved {
+    path: PathBuf,
+    file: Option<File>,
+}
+
+impl Drop for Reserved {
+    fn drop(&mut self) {
+        // A run that waits notices that the file has been removed, and makes another.
+        let _ = fs::remove_file(&self.path);
+        drop(self.file.take());
+    }
+}
+
 impl Drop for Held {
     fn drop(&mut self) {
+        if self.users == Users::Many && self.lock.as_ref().is_none_or(|file| file.try_lock().is_err()) {
+            // Another run still works in the folder.
+            return;
+        }
         // A run that begins at this moment makes another lock file: the folder is then not empty, and stays.
         let mut unfinished = unfinished::lock();
         unfinished.take_file(&self.folder.join(LOCK));
@@ -181,25 +267,41 @@ impl Drop for Held {
 }
 
 /// Makes the folder, and locks it against other runs.
-fn lock(folder: &Path) -> io::Result<File> {
+fn lock(folder: &Path, users: Users) -> io::Result<File> {
     let path = folder.join(LOCK);
     for _ in 0..ATTEMPTS {
         fs::create_dir_all(folder)?;
-        let file = match File::options().create(true).truncate(false).write(true).open(&path) {
+        match lock_file(&path, users) {
             // A run that has just ended removed the folder.
-            Err(error) if error.kind() == ErrorKind::NotFound => continue,
-            file => file?,
-        };
-        match file.try_lock() {
-            Err(TryLockError::WouldBlock) => break,
-            // A run that has just ended removed the file.
-            Ok(()) if !is_at(&file, &path) => {}
-            // Where files cannot be locked, it is left to the user.
-            Ok(()) | Err(TryLockError::Error(_)) => return Ok(file),
+            Err(error) if error.kind() == ErrorKind::NotFound => {}
+            Err(error) => return Err(error),
+            Ok(Some(file)) => return Ok(file),
+            // Runs of single stages that end lock the file for a moment.
+            Ok(None) if users == Users::Many => thread::sleep(MOMENT),
+            Ok(None) => break,
         }
     }
     let message = "another run of gs4d works in this folder: wait until it has ended, or write to another OUT";
     Err(io::Error::new(ErrorKind::ResourceBusy, message))
+}
+
+/// Makes a file and locks it; `None` if another run has locked it.
+fn lock_file(path: &Path, users: Users) -> io::Result<Option<File>> {
+    for _ in 0..ATTEMPTS {
+        let file = File::options().create(true).truncate(false).write(true).open(path)?;
+        let locked = match users {
+            Users::One => file.try_lock(),
+            Users::Many => file.try_lock_shared(),
+        };
+        match locked {
+            Err(TryLockError::WouldBlock) => return Ok(None),
+            // A run that has just ended removed the file.
+            Ok(()) if !is_at(&file, path) => {}
+            // Where files cannot be locked, it is left to the user.
+            Ok(()) | Err(TryLockError::Error(_)) => return Ok(Some(file)),
+        }
+    }
+    Ok(None)
 }
 
 /// Returns whether an open file is the one at this path.
@@ -208,8 +310,11 @@ fn is_at(file: &File, path: &Path) -> bool {
     there.is_some() && open.as_ref().and_then(node) == there.as_ref().and_then(node)
 }
 
-/// Returns whether a file is a stored result.
+/// Returns whether a file is a stored result, or the lock of a stage whose run was killed.
 fn is_stored(path: &Path) -> bool {
+    if path.extension().is_some_and(|extension| extension == LOCK) {
+        return path.is_file();
+    }
     let mut start = [0; MAGIC.len()];
     let read = path.is_file() && File::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok();
     read && start == MAGIC
@@ -280,6 +385,27 @@ mod tests {
         Store::beside(&out, ".bake").expect("nobody works in it");
         fs::write(folder.path().join("file.bake"), b"mine").expect("the folder can be written to");
         Store::beside(&folder.path().join("file"), ".bake").expect_err("a file of that name");
+    }
+
+    #[test]
+    fn runs_of_single_stages_share_a_folder_and_take_turns_at_a_stage() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let (out, progress) = (folder.path().join("scene.gs4d"), &mut crate::offline::NoProgress);
+        let open = || Store::shared(&out, ".bake").expect("shared runs do not exclude one another");
+        let (first, second) = (open(), open());
+        Store::beside(&out, ".bake").expect_err("a whole bake waits for runs of single stages");
+        let reserved = first.reserve("mask", progress).expect("nobody works on the stage");
+        second.reserve("score", progress).expect("nobody works on another stage");
+        let waiting = thread::spawn(move || second.reserve("mask", &mut crate::offline::NoProgress).map(|_| second));
+        thread::sleep(3 * WAIT);
+        assert!(!waiting.is_finished(), "another run works on the stage");
+        drop(reserved);
+        let second = waiting.join().expect("the thread ends").expect("nobody works on the stage");
+        drop(first);
+        assert!(out.with_file_name("scene.gs4d.bake").exists(), "the second run works in the folder");
+        drop(second);
+        assert!(!out.with_file_name("scene.gs4d.bake").exists(), "the last run removes an empty folder");
+        Store::beside(&out, ".bake").expect("nobody works in it");
     }
 
     #[test]

@@ -1,16 +1,20 @@
-//! Computing temporal filters of any kind, and the paper's visibility masks at key-frames.
+//! Computing temporal filters of any kind.
 //!
-//! In: a scene, a kind of filter, key-frames, training cameras and views, an [`Engine`]. Out: a [`TemporalFilter`]. A
-//! mask is the set of Gaussians that are visible at a key-frame, 32 to a word.
+//! In: a scene, a kind of filter, key-frames, training cameras and views, an [`Engine`]. Out: a [`TemporalFilter`]; for one shard of the
+//! views, or put together from the parts of all shards, the sets of Gaussians that they show.
 
 use super::dataset::TrainingView;
 use super::dataset::selection::{distinct_cameras, distinct_times, to_draw};
 use super::engine::Engine;
 use super::memory_check::{BY_RESOLUTION, Pictures};
-use super::score::{ScoreEngine, ScoreError, Want};
+use super::score::{ScoreEngine, ScoreError};
+use super::seen::{Seen, drawings};
+use super::shard::{Label, Shard, part, parts};
+use super::store::Key;
+use super::stored::Stored;
 use super::{OfflineError, Progress, sliced};
 use crate::scene::{FilterKind, GaussianScene, RuntimeScene, TemporalFilter};
-use crate::view::{Camera, RasterFov, View};
+use std::path::{Path, PathBuf};
 
 /// Every kind of filter that can be computed, with its name.
 pub const FILTER_NAMES: [(&str, FilterKind); 3] =
@@ -71,10 +75,90 @@ pub fn filter(
         let gaussians = sliced(scene)?;
         return Ok(TemporalFilter::support(gaussians.iter().copied(), interval, cutoff, keys.max(2) - 1));
     }
-    let runtime = GaussianScene { filter: None, ..scene.clone() }.into_runtime()?;
-    Pictures::looked_at(views).require(engine.headless(), BY_RESOLUTION)?;
+    let runtime = drawn(engine, scene, views)?;
     let mut scorer = engine.scorer(&runtime, runtime.trained_background())?;
     Ok(seen_filter(scorer.as_mut(), &runtime, kind, keys, views, progress)?)
+}
+
+/// Returns the label of a filter of a kind that needs views. `input` is the file of the scene.
+///
+/// # Errors
+/// The file cannot be read.
+pub(crate) fn label(
+    input: &Path,
+    scene: &GaussianScene,
+    kind: FilterKind,
+    keys: u32,
+    views: &[TrainingView],
+    engine: &Engine,
+    shard: Shard,
+) -> Result<Label, OfflineError> {
+    let read = format!("{:?} {:?}", scene.trained_with, scene.playback);
+    Ok(Label::new("mask", shard)
+        .with("scene", Key::of_file(input)?)
+        .with("reading of the scene", Key::of(read.as_bytes()))
+        .with("filter", filter_name(kind))
+        .with("number of key-frames", keys)
+        .with("set of training views", Key::of_views(views))
+        .with("engine", engine.kind()))
+}
+
+/// Looks at the views of the shard of the label, and writes the part; returns false if the same part is there already.
+///
+/// # Errors
+/// As [`filter`], and a part that cannot be written.
+pub(crate) fn write_part(
+    out: &Path,
+    label: &Label,
+    engine: &mut Engine,
+    scene: &GaussianScene,
+    kind: FilterKind,
+    keys: u32,
+    views: &[TrainingView],
+    progress: &mut dyn Progress,
+) -> Result<bool, OfflineError> {
+    if part::is_there(out, label) {
+        return Ok(false);
+    }
+    let runtime = drawn(engine, scene, views)?;
+    let mut scorer = engine.scorer(&runtime, runtime.trained_background())?;
+    let seen = seen(scorer.as_mut(), &runtime, kind, keys, views, label.shard(), progress)?;
+    part::write(out, label, &seen.to_words().encode()?)?;
+    Ok(true)
+}
+
+/// Returns the filter of the parts of all shards, which must have the inputs of the label. `count` is the number of Gaussians.
+///
+/// # Errors
+/// As [`parts::in_order`], files that cannot be read, views that show nothing of the scene.
+pub fn merge(
+    paths: &[PathBuf],
+    label: &Label,
+    kind: FilterKind,
+    keys: u32,
+    count: usize,
+) -> Result<TemporalFilter, OfflineError> {
+    let (paths, _) = parts::in_order(paths, Some(label))?;
+    let (keys, mut merged) = (keys.max(2) as usize, None::<Seen>);
+    for path in &paths {
+        let bytes = part::result(path, Seen::words(keys, count).saturating_mul(4))?;
+        let seen = Vec::<u32>::decode(&bytes).and_then(|words| Seen::of_words(&words, keys, count));
+        let seen = seen.ok_or_else(|| {
+            OfflineError::at(path, "does not hold sets of the Gaussians of this scene: make it again with --shard")
+        })?;
+        match &mut merged {
+            Some(merged) => merged.merge(&seen),
+            None => merged = Some(seen),
+        }
+    }
+    Ok(merged.ok_or(ScoreError::NoViews)?.filter(kind)?)
+}
+
+/// Returns the form of a scene that is drawn, after checking that the engine can draw the views.
+fn drawn(engine: &Engine, scene: &GaussianScene, views: &[TrainingView]) -> Result<RuntimeScene, OfflineError> {
+    let runtime = GaussianScene { filter: None, ..scene.clone() }.into_runtime()?;
+    Pictures::looked_at(views).require(engine.headless(), BY_RESOLUTION)?;
+    Ok(runtime)
 }
 
 /// Computes the [`filter`] of a kind that needs views, with an engine that holds the scene. Begins the task "looking".
@@ -89,22 +173,28 @@ pub fn seen_filter(
     views: &[TrainingView],
     progress: &mut dyn Progress,
 ) -> Result<TemporalFilter, ScoreError> {
-    let (interval, raster_fov) = (scene.trained_with.time_interval, scene.trained_with.raster_fov);
-    let (times, cameras, count) = (key_times(interval, keys), distinct_cameras(views), scene.len());
-    let inside = if kind == FilterKind::Interval { views.len() } else { 0 };
-    progress.begin("looking", times.len() * cameras.len() + inside);
-    let masks = key_frame_masks(scorer, &cameras, raster_fov, &times, count, progress)?;
-    let filter = if kind == FilterKind::Interval {
-        interval_filter(scorer, &masks, &to_draw(views, raster_fov), interval, count, progress)?
-    } else {
-        key_frame_filter(&masks, count)
-    };
-    progress.finish();
-    Ok(filter)
+    seen(scorer, scene, kind, keys, views, Shard::WHOLE, progress)?.filter(kind)
 }
 
-/// A set of Gaussians: Gaussian `i` at bit `i % 32` of word `i / 32`.
-pub type Mask = Vec<u32>;
+/// Looks at the views that belong to a shard, for a filter of a kind that needs views. Begins the task "looking".
+///
+/// # Errors
+/// No views at all, a failure of the engine.
+pub(crate) fn seen(
+    scorer: &mut dyn ScoreEngine,
+    scene: &RuntimeScene,
+    kind: FilterKind,
+    keys: u32,
+    views: &[TrainingView],
+    shard: Shard,
+    progress: &mut dyn Progress,
+) -> Result<Seen, ScoreError> {
+    let (interval, raster_fov) = (scene.trained_with.time_interval, scene.trained_with.raster_fov);
+    let (times, cameras) = (key_times(interval, keys), distinct_cameras(views));
+    let between = if kind == FilterKind::Interval { to_draw(views, raster_fov) } else { Vec::new() };
+    let drawings = drawings(&times, &cameras, &between, raster_fov, interval);
+    Seen::of_shard(scorer, &drawings, times.len(), scene.len(), shard, progress)
+}
 
 /// Returns `keys` evenly spaced times over the interval, both ends included; at least two.
 pub fn key_times(interval: [f32; 2], keys: u32) -> Vec<f32> {
@@ -119,90 +209,6 @@ pub fn keys_every(times: usize, frames: usize) -> usize {
     times.saturating_sub(1).div_ceil(frames.max(1)).max(1) + 1
 }
 
-/// Adds the Gaussians that the view blends into at least one pixel to a set.
-///
-/// # Errors
-/// A failure of the engine.
-pub fn add_blended(engine: &mut dyn ScoreEngine, view: &View, mask: &mut [u32]) -> Result<(), ScoreError> {
-    let score = engine.score(view, Want::Contribution)?;
-    for (word, values) in mask.iter_mut().zip(score.contribution.chunks(32)) {
-        for (bit, &contribution) in values.iter().enumerate() {
-            *word |= u32::from(contribution > 0.0) << bit;
-        }
-    }
-    Ok(())
-}
-
-/// Returns one mask for each key-frame: the Gaussians that any of the cameras blends at that time. `count` is the
-/// number of Gaussians. Advances the caller's task once for each view.
-///
-/// # Errors
-/// No cameras, cameras that show nothing of the scene at any of the times, a failure of the engine.
-pub fn key_frame_masks(
-    engine: &mut dyn ScoreEngine,
-    cameras: &[Camera],
-    raster_fov: RasterFov,
-    times: &[f32],
-    count: usize,
-    progress: &mut dyn Progress,
-) -> Result<Vec<Mask>, ScoreError> {
-    if cameras.is_empty() {
-        return Err(ScoreError::NoViews);
-    }
-    let mut masks = vec![vec![0; TemporalFilter::words(count)]; times.len()];
-    for (mask, &time) in masks.iter_mut().zip(times) {
-        for camera in cameras {
-            if progress.is_interrupted() {
-                return Err(ScoreError::Interrupted);
-            }
-            add_blended(engine, &camera.view(time, raster_fov), mask)?;
-            progress.advance();
-        }
-    }
-    if masks.iter().flatten().all(|&word| word == 0) {
-        return Err(ScoreError::NothingContributes);
-    }
-    Ok(masks)
-}
-
-/// Returns the filter of the paper: in each segment, the union of the masks at its two ends. Pass at least two
-/// masks of `count` Gaussians.
-///
-/// # Panics
-/// If a mask does not have `count` Gaussians.
-pub fn key_frame_filter(masks: &[Mask], count: usize) -> TemporalFilter {
-    from_segments(FilterKind::KeyFrame, &unions(masks), count)
-}
-
-/// Returns the key-frame filter with, in each segment, also the Gaussians that any of the views whose time lies in it
-/// blends. Pass at least two masks of `count` Gaussians. Advances the caller's task once for each view.
-///
-/// # Errors
-/// A failure of the engine.
-///
-/// # Panics
-/// If a mask does not have `count` Gaussians, or if there are views but fewer than two masks.
-pub fn interval_filter(
-    engine: &mut dyn ScoreEngine,
-    masks: &[Mask],
-    views: &[View],
-    interval: [f32; 2],
-    count: usize,
-    progress: &mut dyn Progress,
-) -> Result<TemporalFilter, ScoreError> {
-    let mut segments = unions(masks);
-    let ends = from_segments(FilterKind::Interval, &segments, count);
-    for view in views {
-        if progress.is_interrupted() {
-            return Err(ScoreError::Interrupted);
-        }
-        let segment = ends.segment_of(view.time, interval) as usize;
-        add_blended(engine, view, &mut segments[segment])?;
-        progress.advance();
-    }
-    Ok(from_segments(FilterKind::Interval, &segments, count))
-}
-
 /// Returns the intersection over union of the sets of each pair of neighboring segments; 1 if both are empty.
 pub fn neighbor_overlap(filter: &TemporalFilter) -> Vec<f64> {
     let bits = filter.to_bits();
@@ -214,14 +220,6 @@ pub fn neighbor_overlap(filter: &TemporalFilter) -> Vec<f64> {
         if any == 0 { 1.0 } else { f64::from(both) / f64::from(any) }
     };
     sets.windows(2).map(overlap).collect()
-}
-
-fn unions(masks: &[Mask]) -> Vec<Mask> {
-    masks.windows(2).map(|pair| pair[0].iter().zip(&pair[1]).map(|(a, b)| a | b).collect()).collect()
-}
-
-fn from_segments(kind: FilterKind, segments: &[Mask], count: usize) -> TemporalFilter {
-    TemporalFilter::from_bits(kind, segments.len() as u32, count, segments.concat())
 }
 
 #[cfg(test)]
@@ -239,10 +237,12 @@ mod tests {
     }
 
     #[test]
-    fn a_segment_has_the_union_of_the_masks_at_its_ends() {
-        let filter = key_frame_filter(&[vec![0b0001], vec![0b0110], vec![0b0100]], 4);
-        assert_eq!(filter.segments, 2, "one segment less than masks");
-        assert_eq!(filter.to_bits(), [0b0111, 0b0110], "unions of neighboring masks");
-        assert_eq!(neighbor_overlap(&filter), [2.0 / 3.0], "two of three Gaussians are in both segments");
+    fn the_overlap_of_neighbors_is_the_shared_fraction_of_both() {
+        let filter = TemporalFilter::from_bits(FilterKind::KeyFrame, 3, 4, vec![0b0111, 0b0110, 0]);
+        assert_eq!(
+            neighbor_overlap(&filter),
+            [2.0 / 3.0, 0.0],
+            "two of three Gaussians are in both segments, and none"
+        );
     }
 }

@@ -20,8 +20,12 @@ mod fleet;
 mod kills;
 mod options;
 mod outputs;
+#[cfg(target_os = "linux")]
+mod plan;
 mod prune;
 mod render;
+#[cfg(target_os = "linux")]
+mod shards;
 #[cfg(target_os = "linux")]
 mod signals;
 // The limit of the address space is set by a shell and read from `/proc`.

@@ -13,7 +13,9 @@ use bevy_gs4d::internal::gaussian::conic::exponent;
 use bevy_gs4d::internal::offline::dataset::selection::{distinct_cameras, even_subset, to_draw};
 use bevy_gs4d::internal::offline::prune::{highest, kept_count, select};
 use bevy_gs4d::internal::offline::score::{CpuEngine, ScoreEngine, Traits, Want, score};
-use bevy_gs4d::internal::offline::temporal_filter::{interval_filter, key_frame_filter, key_frame_masks, key_times};
+use bevy_gs4d::internal::offline::seen::{Seen, drawings};
+use bevy_gs4d::internal::offline::shard::Shard;
+use bevy_gs4d::internal::offline::temporal_filter::key_times;
 use bevy_gs4d::internal::reference;
 use bevy_gs4d::offline::NoProgress;
 use bevy_gs4d::offline::dataset::{CameraOptions, Dataset, Split};
@@ -21,7 +23,7 @@ use bevy_gs4d::offline::score::Variant;
 use bevy_gs4d::offline::score::{ScoreError, ScoreSettings, Scores};
 use bevy_gs4d::reference::{Layer, render};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
-use bevy_gs4d::scene::{GaussianScene, RuntimeScene, TemporalFilter};
+use bevy_gs4d::scene::{FilterKind, GaussianScene, RuntimeScene, TemporalFilter};
 use bevy_gs4d::view::{Appearance, Background, BlendSpace, Camera, RasterFov, TILE_SIZE, View};
 use glam::{UVec2, Vec2, Vec3};
 use std::path::Path;
@@ -268,11 +270,12 @@ fn interval_filters_contain_key_frame_filters_and_support_filters_contain_interv
     let cameras = [camera(0.0), camera(2.0), camera(4.0)];
     let times = key_times([0.0, 1.0], segments + 1);
     let mut engine = CpuEngine { scene: &scene, background: BACKGROUND };
-    let masks =
-        key_frame_masks(&mut engine, &cameras, RasterFov::Reference, &times, count, &mut NoProgress).expect("masks");
     let between: Vec<View> = (0..30).map(|i| view(i as f32, (i as f32 + 0.5) / 30.0)).collect();
-    let key_frame = key_frame_filter(&masks, count);
-    let interval = interval_filter(&mut engine, &masks, &between, [0.0, 1.0], count, &mut NoProgress).expect("views");
+    let drawings = drawings(&times, &cameras, &between, RasterFov::Reference, [0.0, 1.0]);
+    let seen = Seen::of_shard(&mut engine, &drawings, times.len(), count, Shard::WHOLE, &mut NoProgress);
+    let seen = seen.expect("views of the scene");
+    let [key_frame, interval] =
+        [FilterKind::KeyFrame, FilterKind::Interval].map(|kind| seen.filter(kind).expect("the cameras show the scene"));
     let support = TemporalFilter::support(scene.iter(), [0.0, 1.0], 0.05, segments);
     let within = |a: &TemporalFilter, b: &TemporalFilter| a.to_bits().iter().zip(b.to_bits()).all(|(a, b)| a & !b == 0);
     assert!(
@@ -380,7 +383,9 @@ fn key_frame_masks_match_the_independent_masks() {
         let mut engine = CpuEngine { scene: &runtime, background: Background::Color([0.0; 3]) };
         let (times, count) = (key_times([0.0, 1.0], keys), runtime.len());
         let raster_fov = runtime.trained_with.raster_fov;
-        let masks = key_frame_masks(&mut engine, &cameras, raster_fov, &times, count, &mut NoProgress).expect("masks");
+        let drawings = drawings(&times, &cameras, &[], raster_fov, [0.0, 1.0]);
+        let seen = Seen::of_shard(&mut engine, &drawings, times.len(), count, Shard::WHOLE, &mut NoProgress);
+        let masks = seen.expect("views of the capture").masks;
         let expected = values(&folder.join("masks.npz"), "vanilla", "|u1");
         let row = count.div_ceil(8);
         assert_eq!(expected.len(), row * masks.len(), "one mask for each key-frame");

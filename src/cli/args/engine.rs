@@ -33,6 +33,11 @@ impl EngineArgs {
         }
     }
 
+    /// Returns the choice.
+    pub(crate) fn choice(&self) -> EngineChoice {
+        self.engine
+    }
+
     /// Opens the engine, after [`check`](Self::check).
     ///
     /// # Errors

@@ -5,15 +5,18 @@
 //! and losses are compared after a short training: the best choice before training is not the best choice after training.
 
 use super::inputs::Inputs;
+use super::job::Scoring;
 use super::size::count_of_size;
 use super::tuning::short;
 use crate::offline::engine::Engine;
 use crate::offline::quality::Trial;
 use crate::offline::report::Tried;
+use crate::offline::score::Scores;
 use crate::offline::search::{Candidate, Goal, ScoreChoice, ScoreSearch, candidates};
+use crate::offline::shard::Shard;
 use crate::offline::stages::Stages;
 use crate::offline::store::Key;
-use crate::offline::stored::Text;
+use crate::offline::stored::{Stored, Text};
 use crate::offline::trained_search::TrainedSearch;
 use crate::offline::{OfflineError, Progress};
 use crate::scene::GaussianScene;
@@ -54,18 +57,69 @@ pub(super) fn require_validation(inputs: &Inputs<'_>) -> Result<(), OfflineError
     }
 }
 
-/// The stage score: scores the Gaussians by the views to train on.
-pub(super) fn score(inputs: &mut Inputs<'_>, stages: &mut Stages<'_>) -> Result<(Vec<Candidate>, Key), OfflineError> {
+/// The stage score: scores the Gaussians by the views to train on. `None` if that was one shard alone.
+pub(super) fn score(
+    inputs: &mut Inputs<'_>,
+    stages: &mut Stages<'_>,
+    scoring: Scoring,
+) -> Result<Option<(Vec<Candidate>, Key)>, OfflineError> {
     let (settings, count) = (inputs.settings, inputs.subject.scene.len());
     let engine = matches!(inputs.engine, Engine::Gpu(_));
     let options = format!("{:?} {:?} {engine}", settings.scoring, settings.score);
     let key = inputs.scene_key.with(inputs.cameras_key).and(&options);
     let are_whole = |candidates: &Vec<Candidate>| candidates.iter().all(|one| one.scores.len() == count);
-    stages.run("score", key, are_whole, |progress| {
-        let Inputs { engine, subject, splits, .. } = inputs;
-        let (scores, _) = settings.scoring.scores(engine, subject, &splits.train, progress)?;
+    if let Scoring::Shard(shard) = scoring {
+        stages.run_part(
+            SCORE,
+            &shard_name(shard),
+            key,
+            |scores: &Scores| scores.len() == count,
+            |progress| {
+                let Inputs { engine, subject, splits, .. } = inputs;
+                settings.scoring.of_shard(engine, subject, &splits.train, shard, progress)
+            },
+        )?;
+        return Ok(None);
+    }
+    let scored = stages.run(SCORE, key, are_whole, |progress| {
+        let scores = match scoring {
+            Scoring::Merge(shards) => merged(inputs, shards, key)?,
+            Scoring::Whole | Scoring::Shard(_) => {
+                let Inputs { engine, subject, splits, .. } = inputs;
+                settings.scoring.scores(engine, subject, &splits.train, progress)?
+            }
+        };
         Ok(candidates(settings.score, &scores)?)
-    })
+    });
+    scored.map(Some)
+}
+
+/// Name of the stage.
+const SCORE: &str = "score";
+
+/// Returns the name under which the sums of a shard are stored.
+pub(super) fn shard_name(shard: Shard) -> String {
+    format!("score-{}-of-{}", shard.index(), shard.count())
+}
+
+/// Puts the stored sums of all shards together.
+fn merged(inputs: &Inputs<'_>, shards: u32, key: Key) -> Result<Scores, OfflineError> {
+    let (store, count) = (&inputs.store, inputs.subject.scene.len());
+    let mut merged: Option<Scores> = None;
+    for shard in Shard::all(shards) {
+        let scores = store.load(&shard_name(shard), key).and_then(|bytes| Scores::decode(&bytes));
+        let scores = scores.filter(|scores| scores.len() == count).ok_or_else(|| {
+            let message = format!(
+                "has no result of the shard {shard} of the stage score: run --only score --shard {shard} before"
+            );
+            OfflineError::at(store.folder(), message)
+        })?;
+        match &mut merged {
+            Some(merged) => merged.merge(&scores),
+            None => merged = Some(scores),
+        }
+    }
+    Ok(merged.ok_or(OfflineError::NoScore)?.whole()?)
 }
 
 /// The stage prune: chooses the score and the count, given the key of the scores. Returns the key of the Gaussians that are kept.

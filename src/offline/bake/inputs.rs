@@ -2,6 +2,7 @@
 //!
 //! In: a scene, [`BakeSettings`]. Out: the views of its dataset, divided; the folder of results; the keys of the contents of all inputs.
 
+use super::job::{Job, Scoring};
 use super::settings::BakeSettings;
 use crate::offline::belonging::require_belonging;
 use crate::offline::convert::require_no_windows;
@@ -16,6 +17,9 @@ use crate::offline::store::{Key, Store};
 use crate::offline::{OfflineError, Progress, Subject, trained_pixel};
 use crate::scene::{GaussianScene, MAX_SEGMENTS, SceneForm};
 use std::sync::Arc;
+
+/// Appended to the name of the package: the name of the folder of results.
+pub(super) const FOLDER: &str = ".bake";
 
 /// The inputs that the stages of a bake share.
 pub(super) struct Inputs<'a> {
@@ -44,11 +48,15 @@ impl<'a> Inputs<'a> {
     pub(super) fn open(
         mut scene: GaussianScene,
         settings: &'a BakeSettings,
+        job: Option<Job>,
         engine: &'a mut Engine,
         progress: &mut dyn Progress,
     ) -> Result<Self, OfflineError> {
         let BakeSettings { checkpoint, data, splits: options, .. } = settings;
-        let store = Store::beside(&settings.out, ".bake")?;
+        let store = match job {
+            Some(_) => Store::shared(&settings.out, FOLDER)?,
+            None => Store::beside(&settings.out, FOLDER)?,
+        };
         require_no_windows(scene.filter.as_ref(), "a bake")?;
         scene.filter = None;
         scene.levels.clear();
@@ -64,7 +72,9 @@ impl<'a> Inputs<'a> {
         let mut subject = Subject::new(checkpoint, scene, settings.background)?;
         let pixel = trained_pixel(&subject.scene, &views);
         (subject.scene.trained_with.pixel, subject.runtime.trained_with.pixel) = (pixel, pixel);
-        if !settings.trust_images {
+        // Of the jobs of a bake one checks the images.
+        let checks = job.is_none_or(|job| job.stage == "score" && !matches!(job.scoring, Scoring::Shard(_)));
+        if checks && !settings.trust_images {
             require_belonging(engine, &subject.runtime, &views, subject.background)?;
         }
         let inputs =
@@ -105,11 +115,7 @@ impl<'a> Inputs<'a> {
 
     /// Returns why the scene cannot be trained; `None` if it can be.
     fn obstacle(&self) -> Option<String> {
-        if !matches!(self.subject.scene.form, SceneForm::Trained(_)) {
-            return Some("the scene is not in the trained form".to_owned());
-        }
-        let missing = self.views.iter().find(|view| !view.image.is_file())?;
-        Some(format!("{} is missing", missing.image.display()))
+        obstacle(&self.subject.scene.form, &self.views)
     }
 
     /// Returns the number of key-frames of the filter.
@@ -125,6 +131,15 @@ impl<'a> Inputs<'a> {
             Goal::Keep(_) | Goal::Remove(_) | Goal::MaxLoss(_) => u64::MAX,
         }
     }
+}
+
+/// Returns why a scene of this form cannot be trained on these views; `None` if it can be.
+pub(super) fn obstacle(form: &SceneForm, views: &[TrainingView]) -> Option<String> {
+    if !matches!(form, SceneForm::Trained(_)) {
+        return Some("the scene is not in the trained form".to_owned());
+    }
+    let missing = views.iter().find(|view| !view.image.is_file())?;
+    Some(format!("{} is missing", missing.image.display()))
 }
 
 /// Checks that the pictures of every stage fit the memory and the GPU, before the first stage.

@@ -60,7 +60,7 @@ fn remove_in_rounds(
             scene = fine_tune(headless, scene, &images, &tuning, None, progress)?.scene;
         }
         let subject = Subject::new(&inputs.settings.checkpoint, scene, inputs.settings.background)?;
-        let (scores, _) = inputs.settings.scoring.scores(inputs.engine, &subject, &inputs.splits.train, progress)?;
+        let scores = inputs.settings.scoring.scores(inputs.engine, &subject, &inputs.splits.train, progress)?;
         scene = select(&subject.scene, &highest(&scores.of(variant)?, count));
         progress.note(&format!("{count} Gaussians remain"));
     }

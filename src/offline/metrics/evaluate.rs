@@ -57,16 +57,27 @@ impl ImageMetrics {
     /// # Errors
     /// [`SizeMismatch`] if the pictures do not have the same size, or are empty.
     pub fn of(reference: &Picture, picture: &Picture, wanted: MetricSet) -> Result<Self, SizeMismatch> {
-        let error = SquaredError::of(reference, picture)?;
         Ok(Self {
-            psnr: error.channel_psnr(),
-            psnr_pooled: error.psnr(),
-            identical: error.is_identical(),
             ssim: wanted.ssim.then(|| ssim(reference, picture)).transpose()?,
             ms_ssim: if wanted.ms_ssim { ms_ssim(reference, picture)? } else { None },
             flip: wanted.flip.then(|| flip(reference, picture)).transpose()?,
-            error,
+            ..SquaredError::of(reference, picture)?.into()
         })
+    }
+}
+
+/// The PSNR of a picture, and no other metric.
+impl From<SquaredError> for ImageMetrics {
+    fn from(error: SquaredError) -> Self {
+        Self {
+            psnr: error.channel_psnr(),
+            psnr_pooled: error.psnr(),
+            identical: error.is_identical(),
+            ssim: None,
+            ms_ssim: None,
+            flip: None,
+            error,
+        }
     }
 }
 

@@ -5,6 +5,7 @@
 //! [`MAX_PSNR`].
 
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
 use super::size_mismatch::{SizeMismatch, check_sizes};
 use crate::view::Picture;
@@ -16,7 +17,7 @@ pub const MAX_PSNR: f64 = 200.0;
 const MIN_ERROR: f64 = 1e-20;
 
 /// The squared error of any number of pairs of pictures. Default: of none.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct SquaredError {
     /// Sum of the squared differences, per channel.
     sum: DVec3,

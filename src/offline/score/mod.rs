@@ -6,8 +6,11 @@
 pub(crate) mod engine;
 pub(crate) mod file;
 pub(crate) mod gpu;
+pub(crate) mod parts;
 pub(crate) mod reference;
 mod scoring;
+mod sums;
+mod total;
 pub(crate) mod traits;
 mod variant;
 
@@ -23,9 +26,12 @@ pub use traits::ScoreSettings;
 pub(crate) use traits::Traits;
 pub use variant::{UnknownVariant, Variant};
 
-use super::Progress;
+use super::shard::Shard;
+use super::stored::Stored;
+use super::{OfflineError, Progress};
 use crate::view::View;
 use rayon::prelude::*;
+use sums::{BYTES, Sums};
 
 /// Every score of every Gaussian.
 ///
@@ -47,6 +53,7 @@ use rayon::prelude::*;
 pub struct Scores {
     sums: Vec<Sums>,
     has_volume: bool,
+    views: usize,
 }
 
 impl Scores {
@@ -61,15 +68,29 @@ impl Scores {
         settings: &ScoreSettings,
         progress: &mut dyn Progress,
     ) -> Result<Self, ScoreError> {
+        Self::of_shard(engine, traits, views, settings, Shard::WHOLE, progress)?.whole()
+    }
+
+    /// Scores the views of a shard: some of the times with all their views. The scores of all shards are [merged](Self::merge).
+    ///
+    /// # Errors
+    /// No views at all, a failure of the engine.
+    pub(crate) fn of_shard(
+        engine: &mut dyn ScoreEngine,
+        traits: &Traits,
+        views: &[View],
+        settings: &ScoreSettings,
+        shard: Shard,
+        progress: &mut dyn Progress,
+    ) -> Result<Self, ScoreError> {
         if views.is_empty() {
             return Err(ScoreError::NoViews);
         }
         let factors = traits.volume_factors(settings);
         let weights = |index: usize| factors.as_ref().map_or(1.0, |factors| factors[index]);
         let mut sums = vec![Sums::default(); traits.moments.len()];
-        let mut views = views.to_vec();
-        views.sort_by(|a, b| a.time.total_cmp(&b.time));
-        for moment in views.chunk_by(|a, b| a.time == b.time) {
+        let moments = moments(views, shard);
+        for moment in &moments {
             let mut contribution = vec![0.0; sums.len()];
             for view in moment {
                 if progress.is_interrupted() {
@@ -77,10 +98,9 @@ impl Scores {
                 }
                 let score = engine.score(view, Want::Removal)?;
                 add(&mut contribution, &score.contribution);
-                for ((sum, &energy), &removal) in sums.iter_mut().zip(&score.energy).zip(&score.removal) {
-                    sum.energy += f64::from(energy);
-                    sum.removal += f64::from(removal);
-                }
+                sums.par_iter_mut().zip(&score.energy).zip(&score.removal).for_each(|((sum, &energy), &removal)| {
+                    sum.add_view(energy.into(), removal.into());
+                });
                 progress.advance();
             }
             let (time, count) = (f64::from(moment[0].time), moment.len() as f64);
@@ -88,10 +108,44 @@ impl Scores {
                 sum.add_moment(time, count, traits.moments[index], weights(index), contribution[index]);
             });
         }
-        if sums.iter().all(|sum| sum.spatial == 0.0) {
-            return Err(ScoreError::NothingContributes);
+        Ok(Self { sums, has_volume: factors.is_some(), views: moments.iter().map(Vec::len).sum() })
+    }
+
+    /// Adds the scores of another shard with the same inputs.
+    pub(crate) fn merge(&mut self, other: &Self) {
+        self.sums.par_iter_mut().zip(&other.sums).for_each(|(sum, other)| sum.merge(other));
+        self.views += other.views;
+    }
+
+    /// Returns these scores, which are those of all shards.
+    ///
+    /// # Errors
+    /// Views that show nothing of the scene.
+    pub(crate) fn whole(self) -> Result<Self, ScoreError> {
+        match self.contributing() {
+            0 => Err(ScoreError::NothingContributes),
+            _ => Ok(self),
         }
-        Ok(Self { sums, has_volume: factors.is_some() })
+    }
+
+    /// Returns the number of views that a shard scores.
+    pub(super) fn count(views: &[View], shard: Shard) -> usize {
+        moments(views, shard).iter().map(Vec::len).sum()
+    }
+
+    /// Returns the number of views that were scored.
+    pub(crate) fn views(&self) -> usize {
+        self.views
+    }
+
+    /// Returns the number of bytes of [`encode`](Stored::encode).
+    fn bytes(&self) -> usize {
+        HEAD + self.len() * BYTES
+    }
+
+    /// Returns the number of Gaussians.
+    pub(crate) fn len(&self) -> usize {
+        self.sums.len()
     }
 
     /// Returns one score of each Gaussian, in the order of the scene.
@@ -112,8 +166,17 @@ impl Scores {
 
     /// Returns the number of Gaussians that contribute to at least one view.
     pub fn contributing(&self) -> usize {
-        self.sums.iter().filter(|sum| sum.spatial > 0.0).count()
+        self.sums.iter().filter(|sum| sum.spatial.value() > 0.0).count()
     }
+}
+
+/// Returns the views of a shard by time, those of one time together. Times ascend.
+fn moments(views: &[View], shard: Shard) -> Vec<Vec<View>> {
+    let mut views = views.to_vec();
+    views.sort_by(|a, b| a.time.total_cmp(&b.time));
+    let moments: Vec<Vec<View>> = views.chunk_by(|a, b| a.time == b.time).map(<[View]>::to_vec).collect();
+    let counts: Vec<usize> = moments.iter().map(Vec::len).collect();
+    shard.share(&counts).into_iter().filter_map(|index| moments.get(index).cloned()).collect()
 }
 
 fn add(sums: &mut [f64], values: &[f32]) {
@@ -122,57 +185,24 @@ fn add(sums: &mut [f64], values: &[f32]) {
     }
 }
 
-/// The sums of one Gaussian.
-#[derive(Debug, Clone, Copy, Default)]
-struct Sums {
-    spatial: f64,
-    temporal: f64,
-    full: f64,
-    first_derivative: f64,
-    sigma: f64,
-    squares: f64,
-    peak: f64,
-    full_squares: f64,
-    full_peak: f64,
-    energy: f64,
-    removal: f64,
-}
-
-impl Sums {
-    /// Adds the views of one time: their number, and the sum of the contributions of the Gaussian to these views.
-    fn add_moment(&mut self, time: f64, views: f64, [mean, variance]: [f64; 2], volume: f64, contribution: f64) {
-        let distance = time - mean;
-        let marginal = (-0.5 * distance * distance / variance).exp();
-        let first = -distance / variance * marginal;
-        let second = (distance / variance * (distance / variance) - variance.recip()) * marginal;
-        let steadiness = |derivative: f64| (0.5 * derivative.abs().tanh() + 0.5).recip();
-        let weight = steadiness(second) * volume;
-        let full = weight * contribution;
-        self.spatial += contribution;
-        self.temporal += views * weight;
-        self.full += full;
-        self.first_derivative += steadiness(first) * volume * contribution;
-        self.sigma += variance * volume * contribution;
-        self.squares += contribution * contribution;
-        self.peak = self.peak.max(contribution);
-        self.full_squares += full * full;
-        self.full_peak = self.full_peak.max(full);
+/// Whether the volume is known (a byte) and the number of views, then the sums of each Gaussian.
+impl Stored for Scores {
+    fn encode(&self) -> Result<Vec<u8>, OfflineError> {
+        let mut bytes = Vec::with_capacity(self.bytes());
+        bytes.push(u8::from(self.has_volume));
+        bytes.extend((self.views as u64).to_le_bytes());
+        self.sums.iter().for_each(|sums| bytes.extend(sums.to_bytes()));
+        Ok(bytes)
     }
 
-    fn value(&self, variant: Variant) -> f64 {
-        match variant {
-            Variant::Spatial => self.spatial,
-            Variant::Temporal => self.temporal,
-            Variant::Full => self.full,
-            Variant::FirstDerivative => self.first_derivative,
-            Variant::Sigma => self.sigma,
-            Variant::Norm2 => self.squares.sqrt(),
-            Variant::Peak => self.peak,
-            Variant::FullNorm2 => self.full_squares.sqrt(),
-            Variant::FullPeak => self.full_peak,
-            Variant::Energy => self.energy.sqrt(),
-            Variant::Removal => self.removal.sqrt(),
-            Variant::EnergyRemoval => (self.energy.sqrt() * self.removal.sqrt()).sqrt(),
-        }
+    fn decode(bytes: &[u8]) -> Option<Self> {
+        let (&has_volume, rest) = bytes.split_first()?;
+        let (views, rest) = rest.split_first_chunk()?;
+        let (sums, []) = rest.as_chunks::<BYTES>() else { return None };
+        let sums = sums.iter().map(Sums::of_bytes).collect();
+        Some(Self { sums, has_volume: has_volume != 0, views: usize::try_from(u64::from_le_bytes(*views)).ok()? })
     }
 }
+
+/// Bytes before the sums.
+const HEAD: usize = 1 + size_of::<u64>();

@@ -7,6 +7,7 @@ use crate::offline::dataset::TrainingView;
 use crate::offline::dataset::selection::to_draw;
 use crate::offline::engine::Engine;
 use crate::offline::memory_check::{BY_RESOLUTION, Pictures};
+use crate::offline::shard::Shard;
 use crate::offline::splits::subset;
 use crate::offline::{OfflineError, Progress, Subject};
 
@@ -20,7 +21,7 @@ pub struct ScoringSettings {
 }
 
 impl ScoringSettings {
-    /// Scores a scene with an even subset of these views. Returns the number of views, too. Begins the task "scoring".
+    /// Scores a scene with an even subset of these views. Begins the task "scoring".
     ///
     /// # Errors
     /// A scene that cannot be drawn, views that do not fit the memory or the GPU, views that show nothing of it, a failure of the engine.
@@ -30,15 +31,30 @@ impl ScoringSettings {
         subject: &Subject,
         views: &[TrainingView],
         progress: &mut dyn Progress,
-    ) -> Result<(Scores, usize), OfflineError> {
+    ) -> Result<Scores, OfflineError> {
+        Ok(self.of_shard(engine, subject, views, Shard::WHOLE, progress)?.whole()?)
+    }
+
+    /// Scores a scene with those views of this subset that belong to a shard. Begins the task "scoring".
+    ///
+    /// # Errors
+    /// As [`scores`](Self::scores), but views that show nothing of the scene.
+    pub(crate) fn of_shard(
+        &self,
+        engine: &mut Engine,
+        subject: &Subject,
+        views: &[TrainingView],
+        shard: Shard,
+        progress: &mut dyn Progress,
+    ) -> Result<Scores, OfflineError> {
         Pictures::looked_at(views).require(engine.headless(), BY_RESOLUTION)?;
         let traits = Traits::of(&subject.scene)?;
         let views = subset(views.to_vec(), self.views);
         let views = to_draw(&views, subject.runtime.trained_with.raster_fov);
         let mut scorer = engine.scorer(&subject.runtime, subject.background)?;
-        progress.begin("scoring", views.len());
-        let scores = Scores::accumulate(scorer.as_mut(), &traits, &views, &self.score, progress)?;
+        progress.begin("scoring", Scores::count(&views, shard));
+        let scores = Scores::of_shard(scorer.as_mut(), &traits, &views, &self.score, shard, progress)?;
         progress.finish();
-        Ok((scores, views.len()))
+        Ok(scores)
     }
 }

@@ -21,7 +21,8 @@ pub fn trained_path(out: &Path) -> PathBuf {
 }
 
 /// Returns the capture of a dataset. Begins the task "training" unless an earlier run has finished it; an interrupted training resumes from
-/// the folder `OUT.bake`.
+/// the folder `OUT.bake`. `only` is the only stage of the bake that may run: another stage than this one needs a training that is done, and
+/// the same stage on another machine is waited for.
 ///
 /// # Errors
 /// No GPU; views or images that cannot be used, Gaussians that do not fit, a package that cannot be written; [`OfflineError::Interrupted`] if
@@ -29,17 +30,35 @@ pub fn trained_path(out: &Path) -> PathBuf {
 pub fn train_dataset(
     settings: &TrainSettings,
     out: &Path,
+    only: Option<&str>,
     engine: &mut Engine,
     progress: &mut dyn Progress,
 ) -> Result<GaussianScene, OfflineError> {
     let Engine::Gpu(headless) = engine else { return Err(OfflineError::TrainingWithoutGpu) };
     let trained = trained_path(out);
     Files::default().reads_data(&settings.data).writes_regular(&trained, "gs4d").check()?;
-    let store = Store::beside(out, ".bake")?;
+    let store = match only {
+        Some(_) => Store::shared(out, ".bake")?,
+        None => Store::beside(out, ".bake")?,
+    };
     let training = Training::open(settings, progress)?;
     let key = training.key();
-    let done = store.load(STAGE, key).zip(Key::of_file(&trained).ok());
-    if done.is_some_and(|(stored, found)| stored == found.bytes()) {
+    let is_done = || {
+        let done = store.load(STAGE, key).zip(Key::of_file(&trained).ok());
+        done.is_some_and(|(stored, found)| stored == found.bytes())
+    };
+    let mut reserved = None;
+    match only {
+        Some(STAGE) => reserved = Some(store.reserve(STAGE, progress)?),
+        Some(only) if !is_done() => {
+            let message = format!(
+                "has no result of the stage {STAGE} with these inputs: run --only {STAGE} before --only {only}"
+            );
+            return Err(OfflineError::at(store.folder(), message));
+        }
+        Some(_) | None => {}
+    }
+    if is_done() {
         progress.note("train: skipped, done before");
     } else {
         let TrainedCapture { tuned, interrupted, .. } = training.run(headless, &store, &trained, progress)?;
@@ -49,6 +68,7 @@ pub fn train_dataset(
         }
         store.store(STAGE, key, Key::of_file(&trained)?.bytes())?;
     }
+    drop(reserved);
     // The stages after this one read the package, so that a resumed run begins with the same bytes.
     Ok(codec::load(&trained, &ReadOptions::default())?)
 }

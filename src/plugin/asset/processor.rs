@@ -121,9 +121,10 @@ fn transformed(
         (ProcessedForm::Packed, Form::Sliced(_)) => scene.pack(&settings.packing)?,
         _ => scene,
     };
-    let interval = scene.trained_with.time_interval;
-    if let Some(segments) = settings.segments.filter(|_| interval[1] > interval[0]) {
-        scene.filter = Some(TemporalFilter::support(scene.iter(), interval, segments));
+    let TrainedWith { time_interval: interval, marginal_cutoff, .. } = scene.trained_with;
+    let has_windows = scene.filter.as_ref().is_some_and(|filter| filter.kind == FilterKind::Window);
+    if let Some(segments) = settings.segments.filter(|_| interval[1] > interval[0] && !has_windows) {
+        scene.filter = Some(TemporalFilter::support(scene.iter(), interval, marginal_cutoff, segments));
     }
     Ok(scene)
 }

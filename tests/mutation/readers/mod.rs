@@ -10,6 +10,7 @@ mod checkpoint;
 mod datasets;
 mod imports;
 mod package;
+mod parts;
 mod pictures;
 mod saved;
 mod scores;
@@ -56,7 +57,7 @@ pub struct Kind {
 }
 
 /// The readers.
-pub static KINDS: [Kind; 21] = [
+pub static KINDS: [Kind; 22] = [
     Kind {
         name: "package",
         about: "packages (.gs4d) in every form, with filters and environment maps",
@@ -203,5 +204,12 @@ pub static KINDS: [Kind; 21] = [
         extension: "sog",
         share: 1,
         make: || Arc::new(imports::Imports::new("sog")),
+    },
+    Kind {
+        name: "parts",
+        about: "parts of shards of scores, masks and evaluations",
+        extension: "gs4p",
+        share: 2,
+        make: || Arc::new(parts::Parts::new()),
     },
 ];

@@ -1,0 +1,172 @@
+//! The Gaussians that views blend, at each key-frame and in each segment of time between two.
+//!
+//! In: key-frames, cameras, views, a [`ScoreEngine`], a shard. Out: sets of Gaussians ([`Seen`]); of all shards their union, and the temporal
+//! filter of these sets.
+
+use super::Progress;
+use super::score::{ScoreEngine, ScoreError, Want};
+use super::shard::Shard;
+use crate::scene::filter::segment_of;
+use crate::scene::{FilterKind, TemporalFilter};
+use crate::view::{Camera, RasterFov, View};
+
+/// A set of Gaussians: Gaussian `i` at bit `i % 32` of word `i / 32`.
+pub type Mask = Vec<u32>;
+
+/// A view whose Gaussians are added to a set.
+#[derive(Debug, Clone, Copy)]
+pub struct Drawing {
+    view: View,
+    set: usize,
+}
+
+/// Returns the drawings of every camera at each key-frame, then those of the views, each for the segment of its time. `interval` is the time
+/// interval, which the key-frames divide evenly.
+pub fn drawings(
+    key_frames: &[f32],
+    cameras: &[Camera],
+    views: &[View],
+    raster_fov: RasterFov,
+    interval: [f32; 2],
+) -> Vec<Drawing> {
+    let keys = key_frames.len();
+    let segments = u32::try_from(keys.saturating_sub(1)).unwrap_or(u32::MAX);
+    let at_keys = key_frames.iter().enumerate().flat_map(|(set, &time)| {
+        cameras.iter().map(move |camera| Drawing { view: camera.view(time, raster_fov), set })
+    });
+    let between =
+        views.iter().map(|&view| Drawing { view, set: keys + segment_of(view.time, interval, segments) as usize });
+    at_keys.chain(between).collect()
+}
+
+/// The Gaussians that were blended into at least one pixel.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Seen {
+    /// By a camera at each key-frame.
+    pub masks: Vec<Mask>,
+    /// By a view in each segment between two key-frames.
+    between: Vec<Mask>,
+    count: usize,
+}
+
+impl Seen {
+    /// Makes the drawings of a shard. `keys` is the number of key-frames, at least two, and `count` that of Gaussians. Begins the task
+    /// "looking".
+    ///
+    /// # Errors
+    /// No drawings at all, a failure of the engine.
+    pub fn of_shard(
+        engine: &mut dyn ScoreEngine,
+        drawings: &[Drawing],
+        keys: usize,
+        count: usize,
+        shard: Shard,
+        progress: &mut dyn Progress,
+    ) -> Result<Self, ScoreError> {
+        if drawings.is_empty() {
+            return Err(ScoreError::NoViews);
+        }
+        let sets = |number: usize| vec![vec![0; TemporalFilter::words(count)]; number];
+        let mut seen = Self { masks: sets(keys), between: sets(keys.saturating_sub(1)), count };
+        let share = shard.share(&vec![1; drawings.len()]);
+        progress.begin("looking", share.len());
+        for Drawing { view, set } in share.into_iter().filter_map(|index| drawings.get(index)) {
+            if progress.is_interrupted() {
+                return Err(ScoreError::Interrupted);
+            }
+            if let Some(mask) = seen.masks.iter_mut().chain(&mut seen.between).nth(*set) {
+                add_blended(engine, view, mask)?;
+            }
+            progress.advance();
+        }
+        progress.finish();
+        Ok(seen)
+    }
+
+    /// Adds the sets of another shard with the same inputs.
+    pub(crate) fn merge(&mut self, other: &Self) {
+        let ours = self.masks.iter_mut().chain(&mut self.between).flatten();
+        let theirs = other.masks.iter().chain(&other.between).flatten();
+        ours.zip(theirs).for_each(|(word, other)| *word |= other);
+    }
+
+    /// Returns the filter of these sets, which are those of all shards: in each segment, the union of the masks at its two ends, as in the
+    /// paper, and for [`FilterKind::Interval`] also the Gaussians seen in the segment.
+    ///
+    /// # Errors
+    /// The cameras show nothing of the scene at any of the key-frames.
+    pub fn filter(&self, kind: FilterKind) -> Result<TemporalFilter, ScoreError> {
+        if self.masks.iter().flatten().all(|&word| word == 0) {
+            return Err(ScoreError::NothingContributes);
+        }
+        let ends = self.masks.iter().zip(self.masks.iter().skip(1));
+        let is_between = kind == FilterKind::Interval;
+        let words = ends.zip(&self.between).flat_map(|((first, last), between)| {
+            let words = first.iter().zip(last).zip(between);
+            words.map(move |((first, last), between)| first | last | if is_between { *between } else { 0 })
+        });
+        Ok(TemporalFilter::from_bits(kind, self.between.len() as u32, self.count, words.collect()))
+    }
+
+    /// Returns the words of all sets.
+    pub(crate) fn to_words(&self) -> Vec<u32> {
+        self.masks.iter().chain(&self.between).flatten().copied().collect()
+    }
+
+    /// Returns the number of words of the sets of `count` Gaussians with `keys` key-frames.
+    pub(crate) fn words(keys: usize, count: usize) -> usize {
+        (2 * keys).saturating_sub(1).saturating_mul(TemporalFilter::words(count))
+    }
+
+    /// Returns the sets of [`to_words`](Self::to_words); `None` if the words are of another scene or other key-frames.
+    pub(crate) fn of_words(words: &[u32], keys: usize, count: usize) -> Option<Self> {
+        if words.len() != Self::words(keys, count) {
+            return None;
+        }
+        let mut sets = words.chunks(TemporalFilter::words(count).max(1)).map(<[u32]>::to_vec);
+        let masks: Vec<Mask> = sets.by_ref().take(keys).collect();
+        Some(Self { masks, between: sets.collect(), count })
+    }
+}
+
+/// Adds the Gaussians that the view blends into at least one pixel to a set.
+fn add_blended(engine: &mut dyn ScoreEngine, view: &View, mask: &mut [u32]) -> Result<(), ScoreError> {
+    let score = engine.score(view, Want::Contribution)?;
+    for (word, values) in mask.iter_mut().zip(score.contribution.chunks(32)) {
+        for (bit, &contribution) in values.iter().enumerate() {
+            *word |= u32::from(contribution > 0.0) << bit;
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn seen(masks: [u32; 3], between: [u32; 2]) -> Seen {
+        let sets = |words: &[u32]| words.iter().map(|&word| vec![word]).collect();
+        Seen { masks: sets(&masks), between: sets(&between), count: 5 }
+    }
+
+    #[test]
+    fn a_segment_has_the_union_of_the_masks_at_its_ends() {
+        let seen = seen([0b0001, 0b0110, 0b0100], [0b1000, 0b1_0000]);
+        let filter = seen.filter(FilterKind::KeyFrame).expect("Gaussians are seen");
+        assert_eq!(filter.segments, 2, "one segment less than masks");
+        assert_eq!(filter.to_bits(), [0b0111, 0b0110], "unions of neighboring masks");
+        let filter = seen.filter(FilterKind::Interval).expect("Gaussians are seen");
+        assert_eq!(filter.to_bits(), [0b1111, 0b1_0110], "and of the Gaussians seen between");
+    }
+
+    #[test]
+    fn merged_sets_are_those_of_all_drawings() {
+        let mut merged = seen([1, 0, 0], [0, 2]);
+        merged.merge(&seen([0, 4, 0], [8, 0]));
+        assert_eq!(merged, seen([1, 4, 0], [8, 2]), "unions");
+        assert_eq!(Seen::of_words(&merged.to_words(), 3, 5), Some(merged.clone()), "words and back");
+        assert_eq!(Seen::of_words(&merged.to_words(), 3, 33), None, "words of another scene");
+        let nothing = seen([0; 3], [1; 2]).filter(FilterKind::Interval);
+        assert!(matches!(nothing, Err(ScoreError::NothingContributes)), "nothing is seen at key-frames");
+    }
+}
