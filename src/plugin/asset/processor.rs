@@ -11,7 +11,9 @@ use super::saver::PackageSaver;
 use crate::codec::checkpoint;
 use crate::gaussian::InvalidGaussian;
 use crate::plugin::component::GaussianCapture;
-use crate::scene::{Form, GaussianScene, MAX_SEGMENTS, PackError, Packing, RuntimeScene, TemporalFilter};
+use crate::scene::{
+    FilterKind, Form, GaussianScene, MAX_SEGMENTS, PackError, Packing, RuntimeScene, TemporalFilter, TrainedWith,
+};
 use bevy::app::App;
 use bevy::asset::AssetApp;
 use bevy::asset::processor::LoadTransformAndSave;
