@@ -8,13 +8,16 @@ pub mod checkpoint;
 mod error;
 pub(crate) mod format;
 pub(crate) mod import;
+mod loading;
 mod options;
 pub mod package;
 mod start;
 pub(crate) mod text;
+mod zstd_frames;
 
 pub use error::{CodecError, CodecErrorKind};
 pub use import::ImportError;
+pub use loading::Loading;
 pub use options::{InvalidOption, ReadOptions};
 
 use crate::scene::GaussianScene;

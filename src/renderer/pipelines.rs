@@ -28,7 +28,7 @@ pub struct Renderer {
     pub(super) layouts: Arc<Layouts>,
     pub(super) activate_count: wgpu::ComputePipeline,
     pub(super) activate_scan: wgpu::ComputePipeline,
-    pub(super) activate_write: wgpu::ComputePipeline,
+    pub(super) activate_store: wgpu::ComputePipeline,
     /// The passes of both designs and of motion.
     pub(super) passes: Arc<Passes>,
     /// The passes that are compiled on another thread; `None` if every pass is compiled by the thread that needs it.
@@ -66,7 +66,7 @@ impl Renderer {
         Ok(Self {
             activate_count: pipeline(&activate, "count", &[&layouts.activate, &layouts.filter]),
             activate_scan: pipeline(&activate, "scan", &[&layouts.activate, &layouts.filter]),
-            activate_write: pipeline(&activate, "write", &[&layouts.activate, &layouts.filter]),
+            activate_store: pipeline(&activate, "store", &[&layouts.activate, &layouts.filter]),
             passes: Arc::new(Passes::new(device, layouts.clone(), checks)),
             compiling: None,
             prefers_global_sort: software || info.backend == wgpu::Backend::BrowserWebGpu,

@@ -1,10 +1,12 @@
 //! Sections: one attribute of a run of Gaussians, as bytes.
 //!
-//! In: words of a scene. Out: a zstd frame of their byte planes and the entry in the section table; and back, checked.
+//! In: words of a scene. Out: a zstd frame of their byte planes and the entry in the section table; and the frame from a reader, checked.
+//! `reading` decompresses it.
 
 use super::attribute::Attribute;
 use super::error::PackageError;
 use super::planes;
+use crate::codec::zstd_frames;
 use serde::{Deserialize, Serialize};
 use std::io::{Read, Write};
 use std::ops::Range;
@@ -42,7 +44,7 @@ pub(super) fn encode(
     level: i32,
 ) -> Result<(Section, Vec<u8>), PackageError> {
     let planes = planes::split(words, attribute, rows.clone());
-    let mut body = zstd::bulk::compress(&planes, level)?;
+    let mut body = zstd_frames::compress(&planes, level)?;
     // All bodies stay in memory until the table is complete.
     body.shrink_to_fit();
     let section = Section {
@@ -93,27 +95,6 @@ impl Section {
         if crc32fast::hash(body) != self.crc32 {
             return Err(PackageError::SectionChecksum { name: self.name.clone() });
         }
-        Ok(())
-    }
-
-    /// Decompresses a body into the table `words`; `planes` is a scratch buffer. The section must have been checked
-    /// against the attribute.
-    pub(super) fn decode(
-        &self,
-        body: &[u8],
-        attribute: &Attribute,
-        planes: &mut Vec<u8>,
-        words: &mut [u32],
-    ) -> Result<(), PackageError> {
-        let damaged = |reason| PackageError::SectionBody { name: self.name.clone(), reason };
-        planes.clear();
-        planes.resize(self.raw_length, 0);
-        // Never writes past the end of the buffer: a frame that holds more is refused.
-        let length = zstd::bulk::decompress_to_buffer(body, planes).map_err(|e| damaged(e.to_string()))?;
-        if length != self.raw_length {
-            return Err(damaged(format!("it holds {length} bytes instead of {}", self.raw_length)));
-        }
-        planes::join(planes, attribute, self.first..self.first + self.count, words);
         Ok(())
     }
 }
