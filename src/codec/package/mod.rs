@@ -24,7 +24,7 @@ pub(crate) mod section;
 pub use envelope::{MAGIC, VERSION};
 pub use error::PackageError;
 pub use header::{EnvironmentSize, Header, StoredFilter, StoredForm, StoredLevel};
-pub(super) use reading::Reading;
+pub(crate) use reading::Reading;
 pub use section::Section;
 
 use super::options::ReadOptions;

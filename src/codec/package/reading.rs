@@ -17,7 +17,7 @@ use std::io::{BufReader, Cursor, Read, Seek};
 use std::sync::Arc;
 
 /// A package of which some sections have been read.
-pub(in crate::codec) struct Reading<R> {
+pub(crate) struct Reading<R> {
     reader: BufReader<R>,
     room: Room,
     sections: Sections,
@@ -64,7 +64,7 @@ impl<R: Read + Seek> Reading<R> {
     ///
     /// # Errors
     /// A damaged header.
-    pub(in crate::codec) fn new(reader: R) -> Result<Self, PackageError> {
+    pub(crate) fn new(reader: R) -> Result<Self, PackageError> {
         let mut reader = BufReader::new(reader);
         let (header, file_length) = envelope::read(&mut reader)?;
         let room = Room::of(&header, file_length);
@@ -75,7 +75,7 @@ impl<R: Read + Seek> Reading<R> {
     ///
     /// # Errors
     /// A damaged section.
-    pub(in crate::codec) fn advance(&mut self, bytes: usize) -> Result<bool, PackageError> {
+    pub(crate) fn advance(&mut self, bytes: usize) -> Result<bool, PackageError> {
         let index = self.levels.len();
         if let Some((body, sections)) = &mut self.level {
             if matches!(sections.advance(body, bytes).map_err(of_level(index))?, Step::None)
@@ -99,7 +99,7 @@ impl<R: Read + Seek> Reading<R> {
     }
 
     /// Returns the part of the sections that has been read, 0 to 1.
-    pub(in crate::codec) fn progress(&self) -> f32 {
+    pub(crate) fn progress(&self) -> f32 {
         let Sections { header, next, begun, .. } = &self.sections;
         let length = |section: &Section| section.length as f64;
         let all: f64 = header.sections.iter().map(length).sum();
@@ -115,7 +115,7 @@ impl<R: Read + Seek> Reading<R> {
     ///
     /// # Errors
     /// A damaged section; parts that contradict each other.
-    pub(in crate::codec) fn finish(mut self) -> Result<GaussianScene, PackageError> {
+    pub(crate) fn finish(mut self) -> Result<GaussianScene, PackageError> {
         while self.advance(usize::MAX)? {}
         let Sections { header, mut scene, .. } = self.sections;
         let sized = header.levels.iter().zip(self.levels);
@@ -128,7 +128,7 @@ impl<R: Read + Seek> Reading<R> {
     ///
     /// # Errors
     /// As [`finish`](Self::finish); options that contradict the stored Gaussians.
-    pub(in crate::codec) fn finish_with(self, options: &ReadOptions) -> Result<GaussianScene, PackageError> {
+    pub(crate) fn finish_with(self, options: &ReadOptions) -> Result<GaussianScene, PackageError> {
         let mut scene = self.finish()?;
         options::apply(options, &mut scene)?;
         Ok(scene)

@@ -4,9 +4,10 @@
 //! [`ReadOptions`] with the values that neither file contains (`load_builder().with_settings(|options: &mut ReadOptions| ..)`
 //! or a `.meta` file). Out: a [`GaussianCapture`] or a [`CaptureLoadError`], to which Bevy adds the path.
 
+use super::pause::pause;
 use crate::codec::ReadOptions;
 use crate::codec::checkpoint::{self, CheckpointError};
-use crate::codec::package::{self, PackageError};
+use crate::codec::package::{self, PackageError, Reading};
 use crate::gaussian::InvalidGaussian;
 use crate::plugin::component::GaussianCapture;
 use bevy::asset::io::Reader;
@@ -14,6 +15,10 @@ use bevy::asset::{AssetLoader, AssetPath, LoadContext, RenderAssetUsages};
 use bevy::reflect::TypePath;
 use serde::{Deserialize, Serialize};
 use std::io::Cursor;
+
+/// Bytes that a step decompresses, and bytes of a file between pauses.
+const STEP: usize = 1 << 18;
+const PIECE: f32 = 262_144.0;
 
 /// Why a capture could not be loaded.
 #[derive(Debug, thiserror::Error)]
@@ -73,7 +78,16 @@ impl AssetLoader for PackageLoader {
         settings: &PackageLoaderSettings,
         _context: &mut LoadContext<'_>,
     ) -> Result<GaussianCapture, CaptureLoadError> {
-        let scene = package::read(Cursor::new(bytes(reader).await?))?;
+        let bytes = bytes(reader).await?;
+        let (length, mut before) = (bytes.len() as f32, 0.0);
+        let mut reading = Reading::new(Cursor::new(bytes))?;
+        while reading.advance(STEP)? {
+            if (reading.progress() - before) * length > PIECE {
+                before = reading.progress();
+                pause().await;
+            }
+        }
+        let scene = reading.finish()?;
         Ok(GaussianCapture::new(scene.into_runtime()?).with_usages(settings.asset_usage))
     }
 
