@@ -10,7 +10,8 @@ set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 exec </dev/null
 
-# The features that can be built separately, without and with Bevy. `default` implies `bevy`; `openxr` is not tested.
+# The features that can be built separately, without and with Bevy. `default` implies `bevy`; `openxr` is not tested; `web` is for wasm32, where the
+# pages are built with it.
 without_bevy=(renderer offline cli)
 with_bevy=(bevy pbr picking testing inspector viewer)
 # Those that need many further crates: only .ci/full builds them.
@@ -115,15 +116,22 @@ has_vulkan_driver() {
     compgen -G '/usr/share/vulkan/icd.d/*.json' >/dev/null || compgen -G '/etc/vulkan/icd.d/*.json' >/dev/null
 }
 
+has_browser() {
+  local name
+  for name in chromium chromium-browser google-chrome chrome; do command -v "$name" >/dev/null && return; done
+  return 1
+}
+
 # The first step: installs missing programs, and prints the build folder and the captures in use.
 prepare() {
   local missing=()
   step 'Preparation of the machine'
   command -v cc >/dev/null || missing+=(gcc libc6-dev)
   has_vulkan_driver || missing+=(mesa-vulkan-drivers libvulkan1)
+  has_browser || missing+=(chromium)
   if [ ${#missing[@]} -gt 0 ] && command -v apt-get >/dev/null; then
     show as_root apt-get update
-    show as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y "${missing[@]}"
+    show as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends "${missing[@]}"
   fi
   command -v cargo >/dev/null || PATH="$PATH:${CARGO_HOME:-$HOME/.cargo}/bin"
   if ! command -v cargo >/dev/null; then

@@ -1,6 +1,6 @@
 // activate: the indices of the Gaussians that are active in a segment of time, in ascending order.
 // In: the filter of one part of a capture, as bits or intervals. Out: the list; the host computes its length. Runs once
-// for all views, only when the segment changes. `count` counts the active Gaussians of each block, `scan` sums the counts, `write` fills
+// for all views, only when the segment changes. `count` counts the active Gaussians of each block, `scan` sums the counts, `store` fills
 // the list. CPU reference: src/reference/activate.rs.
 #import gs4d::types::{Activation, FILTER_BITS}
 #import gs4d::scan::{exclusive_scan, scan_total}
@@ -62,7 +62,7 @@ fn scan(@builtin(local_invocation_index) thread: u32) {
 }
 
 @compute @workgroup_size(256)
-fn write(@builtin(workgroup_id) block: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+fn store(@builtin(workgroup_id) block: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
     let first = block.x * BLOCK + thread * PER_THREAD;
     var at = blocks[block.x] + exclusive_scan(thread_count(first), thread);
     for (var i = first; i < first + PER_THREAD; i++) {

@@ -10,6 +10,7 @@ pub(crate) mod export;
 pub(crate) mod format;
 mod fourdgs;
 pub(crate) mod import;
+mod loading;
 pub(crate) mod npy;
 pub(crate) mod options;
 pub mod package;
@@ -19,6 +20,7 @@ mod zstd_frames;
 
 pub use error::{CodecError, CodecErrorKind};
 pub use import::ImportError;
+pub use loading::Loading;
 pub use options::{InvalidOption, ReadOptions};
 
 use crate::scene::GaussianScene;

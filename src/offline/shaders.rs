@@ -1,12 +1,11 @@
 //! The shaders of scoring and training.
 //!
-//! In: the name of a pass. Out: a naga module, or a wgpu shader module. They import the libraries of the renderer, so that they repeat no rule of
+//! In: the name of a pass. Out: its WGSL text, or a wgpu shader module. They import the libraries of the renderer, so that they repeat no rule of
 //! its passes.
 
 use crate::renderer::shaders::ShaderSet;
-use wgpu::naga::valid::Capabilities;
 
-/// Libraries, each before the libraries that import it.
+/// Libraries by name.
 const LIBRARIES: &[(&str, &str)] = &[
     ("training", include_str!("../../shaders/offline/shared/training.wgsl")),
     ("random", include_str!("../../shaders/offline/shared/random.wgsl")),
@@ -33,8 +32,7 @@ const PASSES: &[(&str, &str)] = &[
 ];
 
 /// The passes of scoring and training.
-pub static SHADERS: ShaderSet =
-    ShaderSet::new(PASSES, LIBRARIES, &[(ATOMIC_SUMS, Capabilities::SHADER_FLOAT32_ATOMIC)]);
+pub static SHADERS: ShaderSet = ShaderSet::new(PASSES, LIBRARIES);
 
 /// Definitions of `blend_backward` and `project_backward` that reproduce the gradients of the original, including its deviations.
 pub const COMPAT: &[&str] = &["COMPAT"];

@@ -84,7 +84,7 @@ impl ActiveList {
             pass.dispatch_workgroups(blocks, 1, 1);
             pass.set_pipeline(&renderer.activate_scan);
             pass.dispatch_workgroups(1, 1, 1);
-            pass.set_pipeline(&renderer.activate_write);
+            pass.set_pipeline(&renderer.activate_store);
             pass.dispatch_workgroups(blocks, 1, 1);
         }
     }

@@ -7,8 +7,8 @@ use super::{global_sort, tile_bins};
 /// The sequence of passes that draws a view. All designs draw the same picture.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum Design {
-    /// [`TileBins`](Self::TileBins), but [`GlobalSort`](Self::GlobalSort) on software drivers, where it is faster, in browsers, where tile bins are
-    /// untested, and for more than 2²⁴ splats, which bins cannot number.
+    /// [`TileBins`](Self::TileBins), but [`GlobalSort`](Self::GlobalSort) on software drivers outside of browsers, where it is faster,
+    /// and for more than 2²⁴ splats, which bins cannot number.
     #[default]
     Auto,
     /// Bins of splats, each sorted by one workgroup. Software drivers draw with [`GlobalSort`](Self::GlobalSort) if they would end the loops over

@@ -1,6 +1,6 @@
-//! A device for commands and tests, outside Bevy.
+//! A device for commands, tests and pages, outside Bevy.
 //!
-//! In: the name or index of an adapter, if any. Out: a [`GpuContext`]. Inside Bevy the renderer uses Bevy's device instead.
+//! In: the name or index of an adapter, or a surface to draw to, if any. Out: a [`GpuContext`]. Inside Bevy the renderer uses Bevy's device instead.
 
 use super::error::GpuError;
 use pollster::block_on;
@@ -23,25 +23,45 @@ impl GpuContext {
     /// # Errors
     /// When there is no such adapter (the message names the packages to install) or the adapter does not provide a device.
     pub fn headless(wanted: Option<&str>) -> Result<Self, GpuError> {
-        let adapter = match wanted {
-            Some(wanted) => choose(wanted)?,
-            None => block_on(instance().request_adapter(&wgpu::RequestAdapterOptions {
-                power_preference: wgpu::PowerPreference::HighPerformance,
-                ..Default::default()
-            }))
-            .map_err(|error| GpuError::NoAdapter { reason: error.to_string() })?,
+        match wanted {
+            Some(wanted) => block_on(Self::of(choose(wanted)?)),
+            None => block_on(Self::open(&instance(), None)),
+        }
+    }
+
+    /// Opens a device on the adapter with the highest performance that can draw to the surface, if one is given. It waits without blocking: in
+    /// browsers nothing may block.
+    ///
+    /// # Errors
+    /// As [`headless`](Self::headless).
+    pub async fn open(instance: &wgpu::Instance, surface: Option<&wgpu::Surface<'_>>) -> Result<Self, GpuError> {
+        let options = wgpu::RequestAdapterOptions {
+            power_preference: wgpu::PowerPreference::HighPerformance,
+            compatible_surface: surface,
+            ..Default::default()
         };
+        let adapter = instance.request_adapter(&options).await;
+        Self::of(adapter.map_err(|error| GpuError::NoAdapter { reason: error.to_string() })?).await
+    }
+
+    /// Opens a device on an adapter, with its limits.
+    async fn of(adapter: wgpu::Adapter) -> Result<Self, GpuError> {
         let info = adapter.get_info();
         // Timestamps are for benchmarks, subgroups for tile bins, float atomics for training. All are optional.
         let timestamps = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES;
         let wanted_features = timestamps | wgpu::Features::SUBGROUP | wgpu::Features::SHADER_FLOAT32_ATOMIC;
-        let (device, queue) = block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+        let descriptor = wgpu::DeviceDescriptor {
             label: Some("gs4d"),
             required_features: adapter.features() & wanted_features,
             required_limits: adapter.limits(),
             ..Default::default()
-        }))
-        .map_err(|error| GpuError::NoDevice { adapter: info.name.clone(), reason: error.to_string() })?;
+        };
+        let device = adapter.request_device(&descriptor).await;
+        let no_device = |error: wgpu::RequestDeviceError| GpuError::NoDevice {
+            adapter: info.name.clone(),
+            reason: error.to_string(),
+        };
+        let (device, queue) = device.map_err(no_device)?;
         Ok(Self { device, queue, info })
     }
 
@@ -53,7 +73,9 @@ impl GpuContext {
 
 fn backends() -> wgpu::Backends {
     // If DX12 is not included, wgpu adds no hidden dispatch to validate each indirect dispatch.
-    if cfg!(windows) {
+    if cfg!(target_family = "wasm") {
+        wgpu::Backends::BROWSER_WEBGPU
+    } else if cfg!(windows) {
         wgpu::Backends::DX12 | wgpu::Backends::VULKAN
     } else {
         wgpu::Backends::VULKAN | wgpu::Backends::METAL

@@ -64,6 +64,7 @@ mod statistics;
 pub(crate) mod tile_bins;
 mod timing;
 pub(crate) mod view;
+mod wgsl;
 mod work;
 
 pub use active::ActiveList;

@@ -28,14 +28,11 @@ pub struct Renderer {
     pub(super) layouts: Arc<Layouts>,
     pub(super) activate_count: wgpu::ComputePipeline,
     pub(super) activate_scan: wgpu::ComputePipeline,
-    pub(super) activate_write: wgpu::ComputePipeline,
+    pub(super) activate_store: wgpu::ComputePipeline,
     /// The passes of both designs and of motion.
     pub(super) passes: Arc<Passes>,
     /// The passes that are compiled on another thread; `None` if every pass is compiled by the thread that needs it.
     compiling: Option<Compiling>,
-    /// Whether [`Design::Auto`] is [`Design::GlobalSort`]: on software drivers, where it is faster, and in browsers, where tile bins are
-    /// untested.
-    prefers_global_sort: bool,
     /// Whether the driver is a software driver: threads copy the uniforms of their instance even in a dispatch of a single instance, and the
     /// loops of a thread may end early.
     pub(super) is_software: bool,
@@ -66,10 +63,9 @@ impl Renderer {
         Ok(Self {
             activate_count: pipeline(&activate, "count", &[&layouts.activate, &layouts.filter]),
             activate_scan: pipeline(&activate, "scan", &[&layouts.activate, &layouts.filter]),
-            activate_write: pipeline(&activate, "write", &[&layouts.activate, &layouts.filter]),
+            activate_store: pipeline(&activate, "store", &[&layouts.activate, &layouts.filter]),
             passes: Arc::new(Passes::new(device, layouts.clone(), checks)),
             compiling: None,
-            prefers_global_sort: software || info.backend == wgpu::Backend::BrowserWebGpu,
             is_software: software,
             no_list: allocator.bind_group("gs4d no active list", &layouts.active, &[no_list.as_entire_binding()]),
             layouts,
@@ -99,10 +95,11 @@ impl Renderer {
         Allocator { device, work: &self.work }
     }
 
-    /// Resolves [`Design::Auto`] for this device: returns [`Design::TileBins`] or [`Design::GlobalSort`].
+    /// Resolves [`Design::Auto`] for this device: returns [`Design::TileBins`], or on software drivers, where it is faster,
+    /// [`Design::GlobalSort`]. In browsers a software driver cannot be told from a GPU.
     pub(super) fn resolve(&self, design: Design) -> Design {
         match design {
-            Design::Auto if self.prefers_global_sort => Design::GlobalSort,
+            Design::Auto if self.is_software => Design::GlobalSort,
             Design::Auto => Design::TileBins,
             chosen @ (Design::TileBins | Design::GlobalSort) => chosen,
         }

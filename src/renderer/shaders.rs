@@ -1,17 +1,14 @@
-//! The shaders: WGSL with imports, composed by naga_oil.
+//! The shaders: WGSL with imports.
 //!
-//! In: the name of a pass. Out: a naga module, or a wgpu shader module. The files are compiled into the binary. [`SHADERS`] has the passes of the
+//! In: the name of a pass. Out: its WGSL text, or a wgpu shader module. The files are compiled into the binary. [`SHADERS`] has the passes of the
 //! renderer; other modules have sets of their own, which import the same libraries.
 
 use super::error::GpuError;
+use super::wgsl::{Library, composed};
 use crate::scene::{Form, PackedColors, PackedScene};
-use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
-use std::borrow::Cow;
-use std::sync::{Mutex, PoisonError};
-use wgpu::naga::valid::Capabilities;
 
-/// Libraries, each before the libraries that import it.
-const LIBRARIES: &[(&str, &str)] = &[
+/// Libraries by name.
+const LIBRARIES: &[Library] = &[
     ("types", include_str!("../../shaders/shared/types.wgsl")),
     ("records", include_str!("../../shaders/shared/records.wgsl")),
     ("conic", include_str!("../../shaders/shared/conic.wgsl")),
@@ -32,7 +29,7 @@ const LIBRARIES: &[(&str, &str)] = &[
 ];
 
 /// Passes by name.
-const PASSES: &[(&str, &str)] = &[
+const PASSES: &[Library] = &[
     ("activate", include_str!("../../shaders/activate.wgsl")),
     ("project", include_str!("../../shaders/global_sort/project.wgsl")),
     ("sort", include_str!("../../shaders/global_sort/sort.wgsl")),
@@ -163,26 +160,18 @@ pub const SUBGROUPS_OF_32: &[&str] = &["SUBGROUPS_OF_32"];
 
 /// The passes of the renderer. The definitions of those that read captures are those of a [`Storage`], and [`COPIED_INSTANCE`]; of those that
 /// write pixels, [`MULTISAMPLED`] and those of a [`ColorPrecision`]. Each design has further definitions for its own passes.
-pub static SHADERS: ShaderSet = ShaderSet::new(PASSES, &[], &[(SUBGROUPS_OF_32, Capabilities::SUBGROUP)]);
+pub static SHADERS: ShaderSet = ShaderSet::new(PASSES, &[]);
 
 /// Passes, and the libraries that they import besides those of the renderer.
 pub struct ShaderSet {
-    passes: &'static [(&'static str, &'static str)],
-    libraries: &'static [(&'static str, &'static str)],
-    /// Definitions that need an optional capability of the device.
-    optional: &'static [(&'static [&'static str], Capabilities)],
-    /// Composers that have parsed the libraries: without optional capabilities, and with them.
-    composers: [Mutex<Option<Composer>>; 2],
+    passes: &'static [Library],
+    libraries: &'static [Library],
 }
 
 impl ShaderSet {
-    /// Returns a set of these passes and libraries, each with its name. A library comes before the libraries that import it.
-    pub const fn new(
-        passes: &'static [(&'static str, &'static str)],
-        libraries: &'static [(&'static str, &'static str)],
-        optional: &'static [(&'static [&'static str], Capabilities)],
-    ) -> Self {
-        Self { passes, libraries, optional, composers: [const { Mutex::new(None) }; 2] }
+    /// Returns a set of these passes and libraries, each with its name.
+    pub const fn new(passes: &'static [Library], libraries: &'static [Library]) -> Self {
+        Self { passes, libraries }
     }
 
     /// Returns the names of the passes.
@@ -190,34 +179,19 @@ impl ShaderSet {
         self.passes.iter().map(|(name, _)| *name)
     }
 
-    /// Returns the validated naga module of a pass with resolved imports and these definitions.
+    /// Returns the WGSL text of a pass with its libraries and these definitions.
     ///
     /// # Errors
-    /// When there is no such pass or it does not compile.
-    pub fn compose(&self, name: &str, definitions: &[&str]) -> Result<wgpu::naga::Module, GpuError> {
+    /// When there is no such pass, or a directive is not understood.
+    pub fn compose(&self, name: &str, definitions: &[&str]) -> Result<String, GpuError> {
         let Some(&(name, source)) = self.passes.iter().find(|(pass, _)| *pass == name) else {
             return Err(GpuError::Shader { name: "unknown", reason: format!("there is no pass `{name}`") });
         };
-        let uses = |own: &[&str]| definitions.iter().any(|definition| own.contains(definition));
-        let needed = self.optional.iter().filter(|(own, _)| uses(own)).map(|(_, capability)| *capability);
-        let needed = needed.fold(Capabilities::empty(), Capabilities::union);
-        let composer = &self.composers[usize::from(!needed.is_empty())];
-        let mut composer = composer.lock().unwrap_or_else(PoisonError::into_inner);
-        if composer.is_none() {
-            // WebGPU supports half-precision values packed into words.
-            *composer = Some(self.composer(Capabilities::SHADER_FLOAT16_IN_FLOAT32 | needed)?);
-        }
-        let Some(composer) = composer.as_mut() else {
-            return Err(GpuError::Shader { name, reason: "there is no composer".into() });
-        };
-        let shader_defs = definitions.iter().map(|name| ((*name).to_owned(), ShaderDefValue::Bool(true))).collect();
-        let descriptor = NagaModuleDescriptor { source, file_path: name, shader_defs, ..Default::default() };
-        composer
-            .make_naga_module(descriptor)
-            .map_err(|error| GpuError::Shader { name, reason: error.emit_to_string(composer) })
+        let libraries = LIBRARIES.iter().chain(self.libraries);
+        composed(source, libraries, definitions).map_err(|reason| GpuError::Shader { name, reason })
     }
 
-    /// Creates the shader module of a pass from the result of [`compose`](Self::compose).
+    /// Creates the shader module of a pass from the result of [`compose`](Self::compose). The device reports a text that does not compile.
     ///
     /// # Errors
     /// As [`compose`](Self::compose).
@@ -228,26 +202,12 @@ impl ShaderSet {
         definitions: &[&str],
         checks: ShaderChecks,
     ) -> Result<wgpu::ShaderModule, GpuError> {
-        let descriptor = wgpu::ShaderModuleDescriptor {
-            label: Some(name),
-            source: wgpu::ShaderSource::Naga(Cow::Owned(self.compose(name, definitions)?)),
-        };
+        let source = wgpu::ShaderSource::Wgsl(self.compose(name, definitions)?.into());
+        let descriptor = wgpu::ShaderModuleDescriptor { label: Some(name), source };
         Ok(match checks {
             ShaderChecks::On => device.create_shader_module(descriptor),
             ShaderChecks::Off => trusted(device, descriptor),
         })
-    }
-
-    /// Returns a composer that has parsed the libraries.
-    fn composer(&self, capabilities: Capabilities) -> Result<Composer, GpuError> {
-        let mut composer = Composer::default().with_capabilities(capabilities);
-        for &(library, source) in LIBRARIES.iter().chain(self.libraries) {
-            let descriptor = ComposableModuleDescriptor { source, file_path: library, ..Default::default() };
-            if let Err(error) = composer.add_composable_module(descriptor) {
-                return Err(GpuError::Shader { name: library, reason: error.emit_to_string(&composer) });
-            }
-        }
-        Ok(composer)
     }
 }
 

@@ -159,11 +159,6 @@ fn mirrors() -> [Mirror; 20] {
     ]
 }
 
-/// Returns a name without the suffix that naga_oil appends to imported names.
-fn plain(name: &str) -> &str {
-    name.split("X_naga_oil").next().unwrap_or(name)
-}
-
 /// Returns all passes, composed.
 fn modules() -> BTreeMap<&'static str, Module> {
     pass_names().map(|name| (name, compose(name, &[]).expect("the pass composes"))).collect()
@@ -191,7 +186,7 @@ fn shared(module: &Module) -> Vec<Shared> {
             _ => (variable.ty, None),
         };
         let TypeInner::Struct { members, span } = &module.types[ty].inner else { return None };
-        let name = plain(module.types[ty].name.as_deref().unwrap_or_default()).to_owned();
+        let name = module.types[ty].name.clone().unwrap_or_default();
         Some(Shared { name, size: *span as usize, members: members.iter().map(member).collect(), stride })
     };
     module.global_variables.iter().filter_map(|(_, variable)| structure(variable)).collect()
@@ -248,7 +243,7 @@ fn structures_of_the_host_have_no_padding_between_members() {
 
 /// Returns the value of a constant in double precision, which represents every u32 and f32.
 fn constant(module: &Module, name: &str) -> f64 {
-    let found = module.constants.iter().find(|(_, constant)| constant.name.as_deref().map(plain) == Some(name));
+    let found = module.constants.iter().find(|(_, constant)| constant.name.as_deref() == Some(name));
     let (_, constant) = found.unwrap_or_else(|| panic!("there is no constant `{name}`"));
     match module.global_expressions[constant.init] {
         Expression::Literal(Literal::F32(value)) => value.into(),

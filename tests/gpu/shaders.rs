@@ -6,14 +6,15 @@
 use crate::support::composed::{compose, pass_names};
 use bevy_gs4d::internal::offline::shaders::{ATOMIC_SUMS, COMPAT, COMPAT_WITHOUT_TIME};
 use bevy_gs4d::internal::renderer::global_sort::AtOnce;
-use bevy_gs4d::internal::renderer::shaders::{BINNED, COPIED_INSTANCE, MULTISAMPLED, SUBGROUPS_OF_32};
+use bevy_gs4d::internal::renderer::shaders::{BINNED, COPIED_INSTANCE, MULTISAMPLED, SHADERS, SUBGROUPS_OF_32};
 use bevy_gs4d::internal::renderer::tile_bins::{Blending, EIGHT_AT_ONCE, FEW_BINS, LARGE_BATCHES, Lists};
 use bevy_gs4d::renderer::{ColorPrecision, Storage};
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 use std::collections::BTreeSet;
 use std::path::Path;
+use wgpu::naga::back::wgsl::{WriterFlags, write_string};
 use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
-use wgpu::naga::{AddressSpace, Expression, Literal, Module, ScalarKind};
+use wgpu::naga::{AddressSpace, Expression, GlobalVariable, Handle, Literal, Module, ScalarKind};
 
 /// Validates a module that may use only these optional capabilities.
 fn validate(name: &str, module: &Module, capabilities: Capabilities) -> Result<(), String> {
@@ -121,6 +122,45 @@ fn workgroup_memory_is_within_the_required_limits() {
         let bytes: u32 = shared.map(|(_, v)| module.types[v.ty].inner.size(module.to_ctx()).next_multiple_of(16)).sum();
         assert!(bytes <= limit, "{name} with {definitions:?} uses {bytes} bytes, the limit is {limit}");
         assert!(2 * bytes > limit, "{name} with {definitions:?} uses more than half of the limit, found {bytes} bytes");
+    }
+}
+
+/// Returns the passes that a page needs, with the definitions of each storage.
+fn passes_of_pages() -> impl Iterator<Item = (&'static str, Vec<&'static str>)> {
+    let names = SHADERS.names();
+    names.flat_map(|name| Storage::ALL.into_iter().map(move |storage| (name, storage.definitions().to_vec())))
+}
+
+/// WGSL reserves names that other languages do not; naga gives an entry point another name if it has such a one.
+#[test]
+fn no_entry_point_has_a_reserved_name() {
+    for (name, definitions) in pass_names().map(|name| (name, Vec::new())).chain(passes_of_pages()) {
+        let module = compose(name, &definitions).expect("the pass composes");
+        let mut validator = Validator::new(ValidationFlags::all(), Capabilities::all());
+        let info = validator.validate(&module).expect("the pass is valid");
+        let text = write_string(&module, &info, WriterFlags::empty()).expect("the pass can be written");
+        for entry in &module.entry_points {
+            let is_kept = text.contains(&format!("fn {}(", entry.name));
+            assert!(is_kept, "{name}: the entry point `{}` has another name in WGSL", entry.name);
+        }
+    }
+}
+
+/// Devices of browsers have at least 8 storage buffers for a stage.
+#[test]
+fn no_pass_of_a_page_uses_more_than_eight_storage_buffers() {
+    for (name, definitions) in passes_of_pages() {
+        let module = compose(name, &definitions).expect("the pass composes");
+        let mut validator = Validator::new(ValidationFlags::all(), Capabilities::all());
+        let info = validator.validate(&module).expect("the pass is valid");
+        for (index, entry) in module.entry_points.iter().enumerate() {
+            let uses = |(handle, variable): &(Handle<GlobalVariable>, &GlobalVariable)| {
+                matches!(variable.space, AddressSpace::Storage { .. })
+                    && !info.get_entry_point(index)[*handle].is_empty()
+            };
+            let used = module.global_variables.iter().filter(uses).count();
+            assert!(used <= 8, "{name} {}: {used} storage buffers", entry.name);
+        }
     }
 }
 

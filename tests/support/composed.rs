@@ -5,17 +5,24 @@
 use bevy_gs4d::internal::{offline, renderer};
 use bevy_gs4d::renderer::GpuError;
 use wgpu::naga::Module;
+use wgpu::naga::front::wgsl::parse_str;
 
 /// Returns the names of all passes.
 pub fn pass_names() -> impl Iterator<Item = &'static str> {
     renderer::shaders::SHADERS.names().chain(offline::shaders::SHADERS.names())
 }
 
-/// Composes a pass with these definitions.
-pub fn compose(name: &str, definitions: &[&str]) -> Result<Module, GpuError> {
+/// Returns the WGSL text of a pass with these definitions.
+pub fn text_of(name: &str, definitions: &[&str]) -> Result<String, GpuError> {
     if offline::shaders::SHADERS.names().any(|pass| pass == name) {
         offline::shaders::SHADERS.compose(name, definitions)
     } else {
         renderer::shaders::SHADERS.compose(name, definitions)
     }
+}
+
+/// Composes a pass with these definitions.
+pub fn compose(name: &str, definitions: &[&str]) -> Result<Module, GpuError> {
+    let text = text_of(name, definitions)?;
+    parse_str(&text).map_err(|error| GpuError::Shader { name: "parsed", reason: error.emit_to_string(&text) })
 }

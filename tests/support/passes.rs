@@ -72,8 +72,6 @@ impl Gpu {
         let mut groups: BTreeMap<u32, Vec<wgpu::BindGroupLayoutEntry>> = BTreeMap::new();
         for (_, variable) in module.global_variables.iter() {
             let (Some(at), Some(name)) = (variable.binding, variable.name.clone()) else { continue };
-            // Names from imported modules have a suffix.
-            let name = name.split("X_naga_oil_mod_X").next().unwrap_or_default().to_owned();
             groups.entry(at.group).or_default().push(layout_entry(at.binding, variable.space));
             resources.push(Resource { group: at.group, binding: at.binding, name });
         }

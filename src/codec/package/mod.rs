@@ -17,22 +17,24 @@ mod header;
 mod layout;
 mod options;
 mod planes;
+mod reading;
+mod room;
 pub(crate) mod section;
 
 pub use envelope::{MAGIC, VERSION};
 pub use error::PackageError;
 pub use header::{EnvironmentSize, Header, StoredFilter, StoredForm, StoredLevel};
+pub(crate) use reading::Reading;
 pub use section::Section;
 
 use super::options::ReadOptions;
-use crate::scene::{GaussianScene, Level, RuntimeScene, SceneForm};
+use crate::scene::GaussianScene;
 use attribute::Attribute;
-use check::unpacked_limit;
 use header::LEVEL;
 use rayon::prelude::*;
+use room::{Room, of_level};
 use serde::Serialize;
-use std::io::{BufReader, Cursor, Read, Seek, Write};
-use std::sync::Arc;
+use std::io::{BufReader, Read, Seek, Write};
 
 /// Extensions of packages, without the dot.
 pub const EXTENSIONS: &[&str] = &["gs4d"];
@@ -119,7 +121,7 @@ pub fn write<W: Write>(mut writer: W, scene: &GaussianScene, settings: &WriteSet
 }
 
 /// Reads a scene from a reader that contains a package and nothing else. All checksums are verified, also those of
-/// unknown sections.
+/// unknown sections. [`Loading`](crate::codec::Loading) does the same in steps.
 ///
 /// Besides the scene, one section at a time is in memory, compressed and decompressed. The parts of the scene fit together
 /// ([`GaussianScene::check`]); whether every Gaussian can be drawn, [`GaussianScene::into_runtime`] checks.
@@ -127,87 +129,7 @@ pub fn write<W: Write>(mut writer: W, scene: &GaussianScene, settings: &WriteSet
 /// # Errors
 /// One [`PackageError`] for each kind of damage.
 pub fn read<R: Read + Seek>(reader: R) -> Result<GaussianScene, PackageError> {
-    let mut reader = BufReader::new(reader);
-    let (header, file_length) = envelope::read(&mut reader)?;
-    let mut room = Room::of(&header, file_length);
-    let mut levels = Vec::new();
-    let mut scene = read_sections(&mut reader, &header, &mut |body| {
-        let index = levels.len();
-        levels.push(room.level(body).map_err(of_level(index))?);
-        Ok(())
-    })?;
-    let sized = header.levels.iter().zip(levels);
-    scene.levels = sized.map(|(stored, scene)| Level { pixels: stored.pixels, scene: Arc::new(scene) }).collect();
-    scene.check().map_err(PackageError::Inconsistent)?;
-    Ok(scene)
-}
-
-/// Reads all sections of a package; `level` receives the sections of levels of detail.
-fn read_sections(
-    reader: &mut impl Read,
-    header: &Header,
-    level: &mut dyn FnMut(&[u8]) -> Result<(), PackageError>,
-) -> Result<GaussianScene, PackageError> {
-    let attributes = header.attributes();
-    let mut scene = layout::blank(header);
-    // Values are written at positions from the header: the tables must have the sizes of the header.
-    header.check_scene(&scene)?;
-    let mut body = Vec::new();
-    for section in &header.sections {
-        section.read_body(reader, &mut body)?;
-        if let Some(attribute) = attributes.iter().find(|a| a.name == section.name) {
-            section.decode(&body, attribute, layout::words_mut(&mut scene, attribute.name))?;
-        } else if section.name == LEVEL {
-            level(&body)?;
-        }
-    }
-    Ok(scene)
-}
-
-/// The bytes that a package and its levels of detail take when they are read, and their limit.
-struct Room {
-    raw: u64,
-    limit: u64,
-}
-
-impl Room {
-    /// Returns the bytes of the scene of a header, and the limit for a file of this length.
-    fn of(header: &Header, file_length: u64) -> Self {
-        Self { raw: header.unpacked(), limit: unpacked_limit(file_length) }
-    }
-
-    /// Returns the header of a level of detail, and the position after it. The level must be within the limit and have no
-    /// levels itself.
-    fn header_of_level(&mut self, body: &[u8]) -> Result<(Header, u64), PackageError> {
-        let mut reader = Cursor::new(body);
-        let (header, _) = envelope::read(&mut reader)?;
-        if !header.levels.is_empty() {
-            return Err(PackageError::Inconsistent("a level of detail that has levels itself"));
-        }
-        self.raw = self.raw.saturating_add(header.unpacked());
-        match self.raw > self.limit {
-            true => Err(PackageError::TooLarge { raw: self.raw, limit: self.limit }),
-            false => Ok((header, reader.position())),
-        }
-    }
-
-    /// Reads a level of detail, which is a package.
-    fn level(&mut self, body: &[u8]) -> Result<RuntimeScene, PackageError> {
-        let (header, start) = self.header_of_level(body)?;
-        let mut reader = Cursor::new(body);
-        reader.set_position(start);
-        let scene = read_sections(&mut reader, &header, &mut |_| Ok(()))?;
-        let SceneForm::Ready(form) = scene.form else {
-            return Err(PackageError::Inconsistent("a level of detail in the trained form"));
-        };
-        let GaussianScene { environment, filter, trained_with, playback, .. } = scene;
-        Ok(RuntimeScene { form, environment, filter, trained_with, playback, levels: Vec::new() })
-    }
-}
-
-/// Returns a function that adds the index of a level of detail, from 0, to an error.
-fn of_level(index: usize) -> impl FnOnce(PackageError) -> PackageError {
-    move |reason| PackageError::Level { index, reason: Box::new(reason) }
+    Reading::new(reader)?.finish()
 }
 
 /// Reads a scene as [`read`] does, and replaces its settings by the options that are given.
@@ -216,9 +138,7 @@ fn of_level(index: usize) -> impl FnOnce(PackageError) -> PackageError {
 /// As [`read`]; options that are invalid or contradict the stored Gaussians.
 pub(super) fn read_with<R: Read + Seek>(reader: R, options: &ReadOptions) -> Result<GaussianScene, PackageError> {
     options.check()?;
-    let mut scene = read(reader)?;
-    options::apply(options, &mut scene)?;
-    Ok(scene)
+    Reading::new(reader)?.finish_with(options)
 }
 
 /// Reads the header and verifies every checksum, without building the scene.

@@ -24,12 +24,13 @@ pub(super) fn split(words: &[u32], attribute: &Attribute, rows: Range<usize>) ->
     planes
 }
 
-/// Writes the rows that `planes` holds into the table `words`. The lengths must fit: `4 × width` bytes for each row.
-pub(super) fn join(planes: &[u8], attribute: &Attribute, rows: Range<usize>, words: &mut [u32]) {
+/// Writes a part of the rows that `planes` holds into the table `words`; the first row of `planes` is 0 in `part`. The lengths must fit:
+/// `4 × width` bytes for each row.
+pub(super) fn join(planes: &[u8], attribute: &Attribute, rows: Range<usize>, part: Range<usize>, words: &mut [u32]) {
     let (count, width) = (rows.len(), attribute.width);
-    for (tile, component) in tiles(count, width) {
+    for (tile, component) in tiles(part.len(), width) {
         let [a, b, c, d] = [0, 1, 2, 3].map(|plane| &planes[(plane * width + component) * count..][..count]);
-        for row in tile {
+        for row in part.start + tile.start..part.start + tile.end {
             words[(rows.start + row) * attribute.stride + attribute.offset + component] =
                 u32::from_le_bytes([a[row], b[row], c[row], d[row]]);
         }
@@ -61,8 +62,11 @@ mod tests {
         let attribute = Attribute { name: "sh_rest", rows: 300, stride: 7, offset: 2, width: 5 };
         let words: Vec<u32> = (0..300 * 7).map(|i: u32| i.wrapping_mul(2_654_435_761)).collect();
         let mut joined = vec![u32::MAX; words.len()];
-        for rows in [0..130, 130..300] {
-            join(&split(&words, &attribute, rows.clone()), &attribute, rows, &mut joined);
+        for (rows, parts) in [(0..130, [0..70, 70..130]), (130..300, [0..1, 1..170])] {
+            let planes = split(&words, &attribute, rows.clone());
+            for part in parts {
+                join(&planes, &attribute, rows.clone(), part, &mut joined);
+            }
         }
         for (i, (joined, word)) in joined.into_iter().zip(words).enumerate() {
             assert_eq!(joined, if i % 7 < 2 { u32::MAX } else { word }, "word {i}");

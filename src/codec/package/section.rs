@@ -1,6 +1,7 @@
 //! Sections: one attribute of a run of Gaussians, as bytes.
 //!
-//! In: words of a scene. Out: a zstd frame of their byte planes and the entry in the section table; and back, checked.
+//! In: words of a scene. Out: a zstd frame of their byte planes and the entry in the section table; and the frame from a reader, checked.
+//! `reading` decompresses it.
 
 use super::attribute::Attribute;
 use super::error::PackageError;
@@ -43,7 +44,7 @@ pub(super) fn encode(
     level: i32,
 ) -> Result<(Section, Vec<u8>), PackageError> {
     let planes = planes::split(words, attribute, rows.clone());
-    let mut body = zstd::bulk::compress(&planes, level)?;
+    let mut body = zstd_frames::compress(&planes, level)?;
     // All bodies stay in memory until the table is complete.
     body.shrink_to_fit();
     let section = Section {
@@ -94,17 +95,6 @@ impl Section {
         if crc32fast::hash(body) != self.crc32 {
             return Err(PackageError::SectionChecksum { name: self.name.clone() });
         }
-        Ok(())
-    }
-
-    /// Decompresses a body into the table `words`. The section must have been checked against the attribute.
-    pub(super) fn decode(&self, body: &[u8], attribute: &Attribute, words: &mut [u32]) -> Result<(), PackageError> {
-        let damaged = |reason| PackageError::SectionBody { name: self.name.clone(), reason };
-        let planes = zstd_frames::decompress(body, self.raw_length).map_err(|e| damaged(e.to_string()))?;
-        if planes.len() != self.raw_length {
-            return Err(damaged(format!("it holds {} bytes instead of {}", planes.len(), self.raw_length)));
-        }
-        planes::join(&planes, attribute, self.first..self.first + self.count, words);
         Ok(())
     }
 }

@@ -5,12 +5,13 @@
 //! or a `.meta` file); for captures of other makes, the files that they name. Out: a [`GaussianCapture`] or a [`CaptureLoadError`], to which
 //! Bevy adds the path.
 
+use super::pause::pause;
 use crate::codec::checkpoint::{self, CheckpointError};
 use crate::codec::format::imported_extensions;
 use crate::codec::import::sequence::next as next_frame;
 use crate::codec::import::source::{Beside, InMemory};
 use crate::codec::import::{ImportError, Imported};
-use crate::codec::package::{self, PackageError};
+use crate::codec::package::{self, PackageError, Reading};
 use crate::codec::{self, CodecErrorKind, ReadOptions};
 use crate::gaussian::InvalidGaussian;
 use crate::plugin::component::GaussianCapture;
@@ -23,6 +24,10 @@ use std::cell::Cell;
 use std::io::Cursor;
 use std::path::Path;
 use std::sync::LazyLock;
+
+/// Bytes that a step decompresses, and bytes of a file between pauses.
+const STEP: usize = 1 << 18;
+const PIECE: f32 = 262_144.0;
 
 /// Why a capture could not be loaded.
 #[derive(Debug, thiserror::Error)]
@@ -88,7 +93,16 @@ impl AssetLoader for PackageLoader {
         settings: &PackageLoaderSettings,
         _context: &mut LoadContext<'_>,
     ) -> Result<GaussianCapture, CaptureLoadError> {
-        let scene = package::read(Cursor::new(bytes(reader).await?))?;
+        let bytes = bytes(reader).await?;
+        let (length, mut before) = (bytes.len() as f32, 0.0);
+        let mut reading = Reading::new(Cursor::new(bytes))?;
+        while reading.advance(STEP)? {
+            if (reading.progress() - before) * length > PIECE {
+                before = reading.progress();
+                pause().await;
+            }
+        }
+        let scene = reading.finish()?;
         Ok(GaussianCapture::new(scene.into_runtime()?).with_usages(settings.asset_usage))
     }
 

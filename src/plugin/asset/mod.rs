@@ -16,13 +16,15 @@
 //!
 //! In `AssetMode::Processed` a [`CaptureProcessor`] makes packages of checkpoints before the game loads them.
 //!
-//! Loading runs off the main thread, and uploading is spread over frames: neither blocks a frame. When a file changes that Bevy watches, or
+//! Loading runs off the main thread (in browsers in short steps on it), and uploading is spread over frames: neither blocks a frame. When a
+//! file changes that Bevy watches, or
 //! a game calls `AssetServer::reload`, the old capture is drawn until the new one is on the GPU. If the new capture is invalid or does not
 //! fit, the old one stays. A capture and its GPU memory are freed with its last handle. Without a renderer, captures are ready once they are
 //! loaded.
 
 mod loader;
 mod messages;
+mod pause;
 mod plugin;
 mod processor;
 mod saver;

@@ -1,0 +1,254 @@
+//! The player of a page, without Bevy.
+//!
+//! In: a canvas, then a file, then cameras and times. Out: pictures on the canvas. The page calls [`Player`] from JavaScript (`page/player.js`); nothing
+//! here waits: a file is opened in steps, and the page asks whether the device has finished the last picture.
+
+use bevy_gs4d::renderer::{
+    ActiveList, CaptureUpload, Design, GpuCapture, GpuContext, Instance, Renderer, ShaderChecks, ViewParameters,
+    ViewRenderer,
+};
+use bevy_gs4d::scene::RuntimeScene;
+use bevy_gs4d::view::{Appearance, Background, RasterFov, View};
+use glam::{Mat4, UVec2};
+use gs4d_web::{About, Faults, Opening, Step, report_panics, view};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use wasm_bindgen::prelude::wasm_bindgen;
+use web_sys::HtmlCanvasElement;
+
+#[path = "player/present.rs"]
+mod present;
+
+use present::Present;
+
+/// Bytes that a step uploads.
+const UPLOAD: u64 = 1 << 18;
+
+/// A player on a canvas.
+#[wasm_bindgen]
+pub struct Player {
+    context: GpuContext,
+    faults: Faults,
+    surface: wgpu::Surface<'static>,
+    configuration: wgpu::SurfaceConfiguration,
+    renderer: Renderer,
+    view: ViewRenderer,
+    present: Present,
+    opening: Option<Loader>,
+    shown: Option<Shown>,
+    /// Whether the device has finished the last picture.
+    finished: Arc<AtomicBool>,
+}
+
+/// A file that is being opened.
+enum Loader {
+    Reading(Opening),
+    Read(Box<RuntimeScene>),
+    Uploading(Box<CaptureUpload<RuntimeScene>>, Kept),
+    Uploaded(Box<Shown>),
+}
+
+/// What is kept of a scene beside its Gaussians.
+struct Kept {
+    about: About,
+    background: Background,
+    raster_fov: RasterFov,
+}
+
+/// The capture that is shown.
+struct Shown {
+    capture: GpuCapture,
+    active: Option<ActiveList>,
+    kept: Kept,
+}
+
+impl Shown {
+    fn instance(&self, view: View) -> Instance<'_> {
+        Instance { capture: &self.capture, active: self.active.as_ref(), view, appearance: Appearance::default() }
+    }
+
+    fn parameters(&self) -> ViewParameters<'static> {
+        ViewParameters { background: self.kept.background, depths: false, ..ViewParameters::default() }
+    }
+}
+
+#[wasm_bindgen]
+impl Player {
+    /// Opens a device that draws on a canvas. `format` is the format that the browser prefers for canvases.
+    ///
+    /// # Errors
+    /// A message about a browser without WebGPU, or a device that cannot run the passes.
+    pub async fn create(canvas: HtmlCanvasElement, format: &str) -> Result<Player, String> {
+        report_panics();
+        let size = UVec2::new(canvas.width(), canvas.height()).max(UVec2::ONE);
+        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
+            backends: wgpu::Backends::BROWSER_WEBGPU,
+            ..wgpu::InstanceDescriptor::new_without_display_handle()
+        });
+        let surface = instance.create_surface(wgpu::SurfaceTarget::Canvas(canvas)).map_err(|e| e.to_string())?;
+        let context = GpuContext::open(&instance, Some(&surface)).await.map_err(|e| e.to_string())?;
+        let device = &context.device;
+        let faults = Faults::of(device);
+        let renderer = Renderer::new(device, ShaderChecks::Off).map_err(|e| e.to_string())?;
+        // Their values are encoded, as those of the renderer.
+        let format = match format {
+            "rgba8unorm" => wgpu::TextureFormat::Rgba8Unorm,
+            _ => wgpu::TextureFormat::Bgra8Unorm,
+        };
+        let configuration = wgpu::SurfaceConfiguration {
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT,
+            format,
+            width: size.x,
+            height: size.y,
+            present_mode: wgpu::PresentMode::Fifo,
+            desired_maximum_frame_latency: 2,
+            alpha_mode: wgpu::CompositeAlphaMode::Opaque,
+            view_formats: Vec::new(),
+        };
+        surface.configure(device, &configuration);
+        let view = ViewRenderer::new(device, &renderer);
+        let present = Present::new(device, format);
+        let (opening, shown, finished) = (None, None, Arc::new(AtomicBool::new(true)));
+        Ok(Self { context, faults, surface, configuration, renderer, view, present, opening, shown, finished })
+    }
+
+    /// Sets the size of the pictures to that of the canvas, pixels.
+    pub fn resize(&mut self, width: u32, height: u32) {
+        let limit = self.context.device.limits().max_texture_dimension_2d;
+        let size = UVec2::new(width, height).clamp(UVec2::ONE, UVec2::splat(limit));
+        (self.configuration.width, self.configuration.height) = (size.x, size.y);
+        self.surface.configure(&self.context.device, &self.configuration);
+    }
+
+    /// Chooses the design of the renderer by its name.
+    ///
+    /// # Errors
+    /// A message about an unknown name.
+    pub fn set_design(&mut self, name: &str) -> Result<(), String> {
+        let design = Design::NAMES.iter().find(|(known, _)| *known == name).ok_or("no such design")?;
+        self.view.set_design(&self.renderer, design.1);
+        Ok(())
+    }
+
+    /// Begins to open a file. The capture that is shown stays until the file is open.
+    pub fn open(&mut self, name: &str) {
+        // The memory of a file that was being opened is free before that of the next is needed.
+        self.opening = None;
+        self.opening = Some(Loader::Reading(Opening::new(name)));
+    }
+
+    /// Receives bytes of the file. [`step`](Self::step) begins once all have been received.
+    ///
+    /// # Errors
+    /// A message about a file that is larger than the memory.
+    pub fn receive(&mut self, piece: &[u8]) -> Result<(), String> {
+        match &mut self.opening {
+            Some(Loader::Reading(opening)) => opening.receive(piece),
+            _ => Err("no file is being opened".to_owned()),
+        }
+    }
+
+    /// Does one step of opening. Returns what there is to tell about the capture when it is shown.
+    ///
+    /// # Errors
+    /// A message about a file of an unknown format, a damaged file, or a capture that the device cannot draw.
+    pub fn step(&mut self) -> Result<Option<About>, String> {
+        let GpuContext { device, queue, .. } = &self.context;
+        match self.opening.take() {
+            None => Err("no file is being opened".to_owned()),
+            Some(Loader::Reading(mut opening)) => {
+                self.opening = Some(match opening.advance()? {
+                    Step::Part => Loader::Reading(opening),
+                    Step::Scene(scene) => Loader::Read(scene),
+                });
+                Ok(None)
+            }
+            Some(Loader::Read(scene)) => {
+                let kept = Kept {
+                    about: About::of(&scene),
+                    background: scene.trained_background(),
+                    raster_fov: scene.trained_with.raster_fov,
+                };
+                let upload = CaptureUpload::new(device, &self.renderer, *scene).map_err(|e| e.to_string())?;
+                ViewRenderer::check_room(device, upload.most_drawn()).map_err(|e| e.to_string())?;
+                self.opening = Some(Loader::Uploading(Box::new(upload), kept));
+                Ok(None)
+            }
+            Some(Loader::Uploading(mut upload, kept)) => {
+                if upload.advance(queue, &self.renderer, UPLOAD) > 0 {
+                    self.opening = Some(Loader::Uploading(upload, kept));
+                    return Ok(None);
+                }
+                let capture = upload.finish(queue, &self.renderer);
+                let active = ActiveList::new(device, &self.renderer, &capture);
+                self.opening = Some(Loader::Uploaded(Box::new(Shown { capture, active, kept })));
+                Ok(None)
+            }
+            Some(Loader::Uploaded(shown)) => {
+                // The passes are compiled here, so that the first picture does not take long.
+                let size = UVec2::new(self.configuration.width, self.configuration.height);
+                let view = view(&Mat4::IDENTITY.to_cols_array(), &[0.5, 0.5], size, 0.0, shown.kept.raster_fov)?;
+                let prepared =
+                    self.view.prepare(device, queue, &self.renderer, &[shown.instance(view)], &shown.parameters());
+                prepared.map_err(|e| e.to_string())?;
+                let about = shown.kept.about.clone();
+                self.shown = Some(*shown);
+                Ok(Some(about))
+            }
+        }
+    }
+
+    /// Returns the part of the opening that is done, 0 to 1.
+    pub fn progress(&self) -> f32 {
+        match &self.opening {
+            Some(Loader::Reading(opening)) => opening.progress(),
+            Some(Loader::Read(_) | Loader::Uploading(..) | Loader::Uploaded(_)) | None => 1.0,
+        }
+    }
+
+    /// Returns whether the device has finished the last picture.
+    pub fn is_ready(&self) -> bool {
+        self.finished.load(Ordering::Relaxed)
+    }
+
+    /// Returns the first fault that the device has reported since the last call.
+    pub fn fault(&self) -> Option<String> {
+        self.faults.take()
+    }
+
+    /// Draws the capture at a time, in its own unit, from a camera: see [`view`].
+    ///
+    /// # Errors
+    /// A message about a camera that is none, a picture that is too large, or a canvas that is lost.
+    pub fn draw(&mut self, time: f32, pose: &[f32], lens: &[f32]) -> Result<(), String> {
+        let Some(shown) = &mut self.shown else { return Ok(()) };
+        let GpuContext { device, queue, .. } = &self.context;
+        let size = UVec2::new(self.configuration.width, self.configuration.height);
+        let view = view(pose, lens, size, time, shown.kept.raster_fov)?;
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("gs4d page") });
+        if let Some(active) = &mut shown.active
+            && active.prepare(queue, &shown.capture, time)
+        {
+            active.record(&self.renderer, &mut encoder, &shown.capture);
+        }
+        let (instances, parameters) = ([shown.instance(view)], shown.parameters());
+        self.view.prepare(device, queue, &self.renderer, &instances, &parameters).map_err(|e| e.to_string())?;
+        self.view.record(&self.renderer, &mut encoder, &instances);
+        let canvas = match self.surface.get_current_texture() {
+            wgpu::CurrentSurfaceTexture::Success(canvas) | wgpu::CurrentSurfaceTexture::Suboptimal(canvas) => canvas,
+            other => return Err(format!("the canvas cannot be drawn on: {other:?}")),
+        };
+        let target = canvas.texture.create_view(&wgpu::TextureViewDescriptor::default());
+        if let Some(color) = self.view.color() {
+            self.present.record(device, &mut encoder, color, &target);
+        }
+        self.finished.store(false, Ordering::Relaxed);
+        queue.submit([encoder.finish()]);
+        let finished = self.finished.clone();
+        queue.on_submitted_work_done(move || finished.store(true, Ordering::Relaxed));
+        canvas.present();
+        Ok(())
+    }
+}
+
+fn main() {}

@@ -1,0 +1,198 @@
+//! The player of a page as a Bevy app: the model of a game in a browser.
+//!
+//! In: a canvas, then a file, then cameras and times. Out: pictures on the canvas. The page calls [`Player`] from JavaScript (`page/player.js`), as it
+//! calls the player without Bevy; a system of the app carries out what was called.
+
+use bevy::asset::AssetMetaCheck;
+use bevy::camera::PerspectiveProjection;
+use bevy::core_pipeline::tonemapping::Tonemapping;
+use bevy::prelude::*;
+use bevy_gs4d::prelude::*;
+use bevy_gs4d::scene::RuntimeScene;
+use gs4d_web::{About, Opening, Step, report_panics};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use wasm_bindgen::prelude::wasm_bindgen;
+use web_sys::HtmlCanvasElement;
+
+/// Frames from a call until its picture is on the canvas: the app draws the frame after the one in which it was called.
+const FRAMES: u32 = 2;
+
+/// A player on a canvas.
+#[wasm_bindgen]
+pub struct Player {
+    opening: Option<Opening>,
+    /// What to tell about the capture once it is shown.
+    about: Option<About>,
+    shared: Shared,
+}
+
+/// What the page and the app tell each other.
+#[derive(Resource, Clone, Default)]
+struct Shared(Arc<Mutex<State>>);
+
+#[derive(Default)]
+struct State {
+    /// From the page: a scene to show, and the camera and the time to draw.
+    scene: Option<Box<RuntimeScene>>,
+    shot: Option<Shot>,
+    /// From the app: whether the scene is shown, why not, and the frames until the last picture is on the canvas.
+    shown: bool,
+    failed: Option<String>,
+    left: u32,
+}
+
+struct Shot {
+    time: f32,
+    camera: Transform,
+    /// Vertical field of view, radians.
+    fov: f32,
+}
+
+impl Shared {
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[wasm_bindgen]
+impl Player {
+    /// Starts an app that draws on a canvas, which has an id. The app chooses the format and the size of its pictures.
+    ///
+    /// # Errors
+    /// None: it has the signature of the player without Bevy.
+    pub async fn create(canvas: HtmlCanvasElement, _format: &str) -> Result<Player, String> {
+        report_panics();
+        let shared = Shared::default();
+        let window = Window {
+            canvas: Some(format!("#{}", canvas.id())),
+            fit_canvas_to_parent: true,
+            prevent_default_event_handling: false,
+            ..default()
+        };
+        App::new()
+            .add_plugins((
+                DefaultPlugins
+                    .set(WindowPlugin { primary_window: Some(window), ..default() })
+                    // A server answers a request for a file that is not there with an error in the console.
+                    .set(AssetPlugin { meta_check: AssetMetaCheck::Never, ..default() }),
+                GaussianCapturePlugin,
+            ))
+            .insert_resource(shared.clone())
+            .insert_resource(ClearColor(Color::BLACK))
+            .add_systems(Startup, setup)
+            .add_systems(Update, obey)
+            .run();
+        Ok(Self { opening: None, about: None, shared })
+    }
+
+    /// Begins to open a file. The capture that is shown stays until the file is open.
+    pub fn open(&mut self, name: &str) {
+        (self.opening, self.about) = (Some(Opening::new(name)), None);
+    }
+
+    /// Receives bytes of the file. [`step`](Self::step) begins once all have been received.
+    ///
+    /// # Errors
+    /// A message about a file that is larger than the memory.
+    pub fn receive(&mut self, piece: &[u8]) -> Result<(), String> {
+        self.opening.as_mut().ok_or("no file is being opened")?.receive(piece)
+    }
+
+    /// Does one step of opening. Returns what there is to tell about the capture when it is shown.
+    ///
+    /// # Errors
+    /// A message about a file of an unknown format, a damaged file, or a capture that the device cannot draw.
+    pub fn step(&mut self) -> Result<Option<About>, String> {
+        if let Some(mut opening) = self.opening.take() {
+            match opening.advance()? {
+                Step::Part => self.opening = Some(opening),
+                Step::Scene(scene) => {
+                    self.about = Some(About::of(&scene));
+                    let mut state = self.shared.state();
+                    (state.scene, state.shown, state.failed) = (Some(scene), false, None);
+                }
+            }
+            return Ok(None);
+        }
+        let mut state = self.shared.state();
+        match state.failed.take() {
+            Some(message) => Err(message),
+            None if state.shown => self.about.take().map(Some).ok_or_else(|| "no file is being opened".to_owned()),
+            None => Ok(None),
+        }
+    }
+
+    /// Returns the part of the opening that is done, 0 to 1.
+    pub fn progress(&self) -> f32 {
+        self.opening.as_ref().map_or(1.0, Opening::progress)
+    }
+
+    /// Returns whether the last picture is on the canvas.
+    pub fn is_ready(&self) -> bool {
+        self.shared.state().left == 0
+    }
+
+    /// Returns the first fault since the last call.
+    pub fn fault(&self) -> Option<String> {
+        self.shared.state().failed.take()
+    }
+
+    /// Draws the capture at a time, in its own unit, from a camera: a pose of sixteen numbers, and a lens of two.
+    ///
+    /// # Errors
+    /// A message about other counts of numbers.
+    pub fn draw(&mut self, time: f32, pose: &[f32], lens: &[f32]) -> Result<(), String> {
+        let pose: &[f32; 16] = pose.try_into().map_err(|_| "a pose has sixteen numbers".to_owned())?;
+        let [_, tan] = *lens else { return Err("a lens of this player has two numbers".to_owned()) };
+        // Cameras of Bevy look along -z, with y up.
+        let flip = Mat4::from_diagonal(Vec4::new(1.0, -1.0, -1.0, 1.0));
+        let camera = Transform::from_matrix(Mat4::from_cols_array(pose).inverse() * flip);
+        let mut state = self.shared.state();
+        state.shot = Some(Shot { time, camera, fov: 2.0 * tan.atan() });
+        state.left = FRAMES;
+        Ok(())
+    }
+}
+
+/// Spawns the camera.
+fn setup(mut commands: Commands) {
+    // Captures need no multisampling, and their colors are not mapped.
+    commands.spawn((Camera3d::default(), Msaa::Off, Tonemapping::None));
+}
+
+/// Carries out what the page has called.
+fn obey(
+    mut commands: Commands,
+    shared: Res<Shared>,
+    mut clear: ResMut<ClearColor>,
+    mut captures: ResMut<Assets<GaussianCapture>>,
+    mut shown: Query<(Entity, &GaussianCapture3d, &CaptureState, &mut Playback)>,
+    mut camera: Single<(&mut Transform, &mut Projection), With<Camera3d>>,
+) {
+    let mut state = shared.state();
+    if let Some(scene) = state.scene.take() {
+        for (entity, ..) in &shown {
+            commands.entity(entity).despawn();
+        }
+        let [red, green, blue] = scene.trained_with.background;
+        clear.0 = Color::srgb(red, green, blue);
+        let capture = captures.add(GaussianCapture::new(*scene));
+        commands.spawn((GaussianCapture3d(capture), Playback { playing: false, ..default() }));
+        return;
+    }
+    let Ok((_, GaussianCapture3d(capture), loaded, mut playback)) = shown.single_mut() else { return };
+    match loaded {
+        CaptureState::Ready => state.shown = true,
+        CaptureState::Failed(message) if !state.shown => state.failed = Some(message.clone()),
+        CaptureState::Loading | CaptureState::Failed(_) => {}
+    }
+    state.left = state.left.saturating_sub(1);
+    if let (Some(shot), Some(capture)) = (state.shot.take(), captures.get(capture)) {
+        playback.time = capture.seconds_at(shot.time);
+        let (transform, projection) = &mut *camera;
+        **transform = shot.camera;
+        **projection = Projection::Perspective(PerspectiveProjection { fov: shot.fov, ..default() });
+    }
+}
+
+fn main() {}

@@ -1,0 +1,82 @@
+//! A file that is opened in steps short enough for a page.
+//!
+//! In: the name of a file, then its bytes, piece by piece. Out: after some steps, a scene ready to draw; an error message for a file that cannot be read.
+
+use bevy_gs4d::codec::{CodecError, Loading, ReadOptions};
+use bevy_gs4d::scene::{GaussianScene, RuntimeScene};
+
+/// Bytes that a step decompresses: a few milliseconds on a slow machine.
+const BYTES: usize = 1 << 16;
+
+/// A file that is being opened.
+pub struct Opening(State);
+
+enum State {
+    Receiving(String, Vec<u8>),
+    Reading(Loading),
+    Read(Box<GaussianScene>),
+    Empty,
+}
+
+/// What a step has done.
+pub enum Step {
+    /// A part of the work.
+    Part,
+    /// All of it.
+    Scene(Box<RuntimeScene>),
+}
+
+impl Opening {
+    /// Begins to open a file with this name.
+    pub fn new(name: &str) -> Self {
+        Self(State::Receiving(name.to_owned(), Vec::new()))
+    }
+
+    /// Adds bytes to the file.
+    ///
+    /// # Errors
+    /// A message about a file that is larger than the memory, or that has been received.
+    pub fn receive(&mut self, piece: &[u8]) -> Result<(), String> {
+        let State::Receiving(_, bytes) = &mut self.0 else { return Err("the file has been received".to_owned()) };
+        let has_room = bytes.try_reserve(piece.len());
+        has_room.map_err(|_| format!("{} bytes are more than a page has memory for", bytes.len() + piece.len()))?;
+        bytes.extend_from_slice(piece);
+        Ok(())
+    }
+
+    /// Does one step, once all bytes have been received.
+    ///
+    /// # Errors
+    /// A message about a file of an unknown format, or a damaged one.
+    pub fn advance(&mut self) -> Result<Step, String> {
+        let message = |error: CodecError| error.to_string();
+        match std::mem::replace(&mut self.0, State::Empty) {
+            State::Receiving(name, bytes) => {
+                let loading = Loading::new(&name, bytes, &ReadOptions::default());
+                self.0 = State::Reading(loading.map_err(message)?);
+                Ok(Step::Part)
+            }
+            State::Reading(mut loading) => {
+                self.0 = match loading.advance(BYTES).map_err(message)? {
+                    true => State::Reading(loading),
+                    false => State::Read(Box::new(loading.finish().map_err(message)?)),
+                };
+                Ok(Step::Part)
+            }
+            State::Read(scene) => {
+                let scene = scene.into_runtime().map_err(|error| error.to_string())?;
+                Ok(Step::Scene(Box::new(scene)))
+            }
+            State::Empty => Err("the file has been opened".to_owned()),
+        }
+    }
+
+    /// Returns the part of the work that is done, 0 to 1.
+    pub fn progress(&self) -> f32 {
+        match &self.0 {
+            State::Receiving(..) => 0.0,
+            State::Reading(loading) => loading.progress(),
+            State::Read(_) | State::Empty => 1.0,
+        }
+    }
+}

@@ -1,0 +1,42 @@
+//! The memory of a package and its levels of detail, which a reader bounds by the length of the file.
+//!
+//! In: the header of a package, then the bytes of each level. Out: the header of the level; an error if all together would take too much.
+
+use super::check::unpacked_limit;
+use super::envelope;
+use super::error::PackageError;
+use super::header::Header;
+use std::io::Cursor;
+
+/// The bytes that a package and its levels of detail take when they are read, and their limit.
+pub(super) struct Room {
+    raw: u64,
+    limit: u64,
+}
+
+impl Room {
+    /// Returns the bytes of the scene of a header, and the limit for a file of this length.
+    pub(super) fn of(header: &Header, file_length: u64) -> Self {
+        Self { raw: header.unpacked(), limit: unpacked_limit(file_length) }
+    }
+
+    /// Returns the header of a level of detail, and the position after it. The level must be within the limit and have no
+    /// levels itself.
+    pub(super) fn header_of_level(&mut self, body: &[u8]) -> Result<(Header, u64), PackageError> {
+        let mut reader = Cursor::new(body);
+        let (header, _) = envelope::read(&mut reader)?;
+        if !header.levels.is_empty() {
+            return Err(PackageError::Inconsistent("a level of detail that has levels itself"));
+        }
+        self.raw = self.raw.saturating_add(header.unpacked());
+        match self.raw > self.limit {
+            true => Err(PackageError::TooLarge { raw: self.raw, limit: self.limit }),
+            false => Ok((header, reader.position())),
+        }
+    }
+}
+
+/// Returns a function that adds the index of a level of detail, from 0, to an error.
+pub(super) fn of_level(index: usize) -> impl FnOnce(PackageError) -> PackageError {
+    move |reason| PackageError::Level { index, reason: Box::new(reason) }
+}
