@@ -101,7 +101,7 @@ impl State {
         }
         match Format::of(&Start::of(&mut Cursor::new(&bytes), path)?).map(|format| format.read) {
             Some(Read::Bytes(_)) => Ok(Self::Other(bytes, None)),
-            Some(Read::File(_)) | None => Err(CodecErrorKind::UnknownFormat(format::unknown())),
+            Some(Read::File(_) | Read::Folder(_)) | None => Err(CodecErrorKind::UnknownFormat(format::unknown())),
         }
     }
 }

@@ -8,6 +8,7 @@
 use super::error::ExportError;
 use super::still::Ready;
 use crate::codec::import::columns::{Columns, Motion};
+use crate::gaussian::Gaussian;
 use crate::scene::{FilterKind, GaussianScene};
 use rayon::prelude::*;
 use std::f64::consts::TAU;

@@ -10,6 +10,7 @@ use super::scene::{PackedColors, PackedScene};
 use crate::gaussian::{Gaussian, Harmonics};
 use crate::scene::filter::{FilterKind, TemporalFilter};
 use crate::scene::form::Form;
+use crate::scene::provenance::TrainedWith;
 use crate::scene::runtime_scene::RuntimeScene;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
