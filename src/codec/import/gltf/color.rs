@@ -45,8 +45,8 @@ mod tests {
     fn small_changes_of_a_color_are_encoded_as_the_color_is() {
         let linear = [0.001, 0.2140, 0.8];
         let mut harmonics = Harmonics { coefficients: 4, degree: 1, degree_t: 0, values: vec![0.0; 12] };
-        for channel in 0..3 {
-            harmonics.values[channel] = coefficient(linear[channel]);
+        for (channel, linear) in linear.into_iter().enumerate() {
+            harmonics.values[channel] = coefficient(linear);
             harmonics.values[3 + channel] = 0.0005;
         }
         let before = harmonics.clone();
