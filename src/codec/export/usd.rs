@@ -1,4 +1,4 @@
-//! OpenUSD text files (.usda) with a `ParticleField3DGaussianSplat`, which OpenUSD has since version 26.03.
+//! USD text files (.usda) with a `ParticleField3DGaussianSplat`, which is in version 26.03 of USD and later ones.
 //!
 //! In: [`Columns`] at rest or with motion, and the frames of the clip. Out: the file, +Y up. Of moving Gaussians, positions and opacities have a sample
 //! for each frame; if it takes less space, as with a sequence of separate sets of Gaussians, each frame has all values of its visible ones instead.
