@@ -82,17 +82,22 @@ impl Chains<'_> {
         }
         let mut joined = Vec::with_capacity(frame.len());
         for (place, &index) in frame.iter().enumerate() {
-            let equal = |found: &mut Self| {
-                let candidates = by_bits.get_mut(&found.hash(index))?;
-                let at = candidates.iter().position(|&chain| found.are_equal(chain, index))?;
-                Some(candidates.swap_remove(at))
+            let chain = match chain_of[place] {
+                Some(chain) => chain,
+                None => self.take_equal(&mut by_bits, index).unwrap_or(index),
             };
-            let chain = chain_of[place].or_else(|| equal(self)).unwrap_or(index);
             let end = intervals[index] >> 16;
             self.ends[chain] = Some(end);
             joined.push((chain, end));
         }
         joined
+    }
+
+    /// Removes a chain that is equal to a Gaussian in every bit.
+    fn take_equal(&self, by_bits: &mut HashMap<u64, Vec<usize>>, index: usize) -> Option<usize> {
+        let candidates = by_bits.get_mut(&self.hash(index))?;
+        let at = candidates.iter().position(|&chain| self.are_equal(chain, index))?;
+        Some(candidates.swap_remove(at))
     }
 
     fn hash(&self, index: usize) -> u64 {
