@@ -9,7 +9,8 @@
 //! * click: mark the Gaussian there; the panel names it
 //! * space: play and pause; left and right: one frame back and forward, at the panel's frame rate
 //! * F1: close and open the panel
-//! * drop a `.gs4d` or `.pth` on the window: play that file; if it cannot be read, the panel shows the reason
+//! * drop a capture on the window, a file of any format or the folder of a sequence: play it; if it cannot be read, the panel shows the
+//!   reason
 //!
 //! With `--headless FOLDER`, or without a display, it writes N (8) pictures to FOLDER (`out`) instead, without the panel.
 
@@ -25,6 +26,7 @@ use bevy::window::PrimaryWindow;
 use bevy_egui::input::{egui_wants_any_keyboard_input, egui_wants_any_pointer_input};
 use bevy_gs4d::Upright;
 use bevy_gs4d::asset::GaussianCapture;
+use bevy_gs4d::codec::ReadOptions;
 use bevy_gs4d::inspector::{Inspector, InspectorPlugin};
 use bevy_gs4d::picker::CapturePicker;
 use bevy_gs4d::playback::Playback;
@@ -32,7 +34,7 @@ use bevy_gs4d::testing::{self, Offscreen};
 use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin};
 use common::Orbit;
 use controls::{follow, mouse};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 #[derive(Resource)]
@@ -176,6 +178,21 @@ fn pick(
     inspector.note = format!("Gaussian {}, {:.2} away", hit.gaussian, hit.distance);
 }
 
+/// Loads a file, or the capture in a folder: its `meta.json`, or its numbered files as a sequence.
+fn load(assets: &AssetServer, path: &Path) -> Handle<GaussianCapture> {
+    if !path.is_dir() {
+        return assets.load(path.to_owned());
+    }
+    let files = path.read_dir().into_iter().flatten().flatten().map(|entry| entry.path());
+    let first = files.filter(|file| file.extension().is_some_and(|extension| extension == "ply")).min();
+    match first {
+        Some(first) => {
+            assets.load_builder().with_settings(|options: &mut ReadOptions| options.sequence = true).load(first)
+        }
+        None => assets.load(path.join("meta.json")),
+    }
+}
+
 fn drop_file(
     mut drops: MessageReader<FileDragAndDrop>,
     assets: Res<AssetServer>,
@@ -184,7 +201,7 @@ fn drop_file(
     for drop in drops.read() {
         if let FileDragAndDrop::DroppedFile { path_buf, .. } = drop {
             let (shown, playback) = &mut *capture;
-            shown.0 = assets.load(path_buf.clone());
+            shown.0 = load(&assets, path_buf);
             **playback = Playback::default();
         }
     }

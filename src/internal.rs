@@ -48,6 +48,7 @@ pub mod reference {
 pub mod scene {
     pub use crate::scene::detail::*;
     pub use crate::scene::filter::*;
+    pub use crate::scene::merge_neighbors::*;
 
     /// The packed form.
     pub mod packed {
@@ -66,6 +67,17 @@ pub mod codec {
     use crate::codec::{CodecErrorKind, ReadOptions};
     use crate::scene::GaussianScene;
     use std::path::Path;
+
+    pub use crate::codec::import::sequence::next as next_frame;
+
+    /// Reads the frames of a sequence, each the name and the bytes of a file, without options: the scene, and what it does not show.
+    ///
+    /// # Errors
+    /// As [`load`](crate::codec::load).
+    pub fn read_frames(frames: Vec<(String, Vec<u8>)>) -> Result<(GaussianScene, Vec<String>), CodecErrorKind> {
+        let imported = crate::codec::read_frames(frames, &ReadOptions::default())?;
+        Ok((imported.scene, imported.lost))
+    }
 
     /// Reads a capture of another make from bytes in memory, without options and without other files: the scene, and what it does not show.
     ///
@@ -176,6 +188,7 @@ pub mod offline {
     pub mod fine_tune {
         pub use crate::offline::fine_tune::adam::*;
         pub use crate::offline::fine_tune::dropout::*;
+        pub use crate::offline::fine_tune::environment_backward::*;
         pub use crate::offline::fine_tune::loss::*;
         pub use crate::offline::fine_tune::neighbors::*;
         pub use crate::offline::fine_tune::noise::*;

@@ -153,6 +153,10 @@
     expect(rustdoc::broken_intra_doc_links, reason = "this page describes modules that are not part of this build")
 )]
 #![cfg_attr(
+    not(feature = "renderer"),
+    expect(dead_code, reason = "the core has private items that only the offline half or the plugin uses")
+)]
+#![cfg_attr(
     all(feature = "renderer", not(feature = "cli")),
     expect(
         dead_code,

@@ -5,7 +5,7 @@
 #import gs4d::types::{FrameUniforms, BACKGROUND_COLOR, BACKGROUND_ENVIRONMENT, DEBUG_DEPTH, DEBUG_OVERDRAW}
 #import gs4d::alpha::{is_opaque, is_skipped, left_behind}
 #import gs4d::appearance::{BRIGHTEST, heat, lit}
-#import gs4d::environment::environment_texel
+#import gs4d::environment::{bilinear_weight, environment_behind}
 
 const FAR: f32 = 3.4e38;
 // Number of blended splats at the upper end of the overdraw scale.
@@ -248,17 +248,15 @@ fn passed_limits(depth: f32) -> u32 {
 }
 
 fn environment_color(position: vec2<f32>) -> vec3<f32> {
-    let ndc = (position + 0.5) / vec2<f32>(frame.size) * 2.0 - 1.0;
-    let ray = vec3((ndc - frame.projection.zw) / frame.projection.xy, 1.0);
-    let world = frame.world_x.xyz * ray.x + frame.world_y.xyz * ray.y + frame.world_z.xyz * ray.z;
-    let origin = vec3(frame.world_x.w, frame.world_y.w, frame.world_z.w);
-    let at = environment_texel(origin, normalize(world), frame.environment_size);
+    let size = frame.environment_size;
+    let at = environment_behind(
+        position, frame.size, frame.projection, frame.world_x, frame.world_y, frame.world_z, size
+    );
     let corner = floor(at);
     var color = vec3(0.0);
     for (var i = 0u; i < 4u; i++) {
         let texel = corner + vec2(f32(i & 1u), f32(i >> 1u));
-        let weight = (1.0 - abs(at.x - texel.x)) * (1.0 - abs(at.y - texel.y));
-        color += weight * environment_at(texel);
+        color += bilinear_weight(at, texel) * environment_at(texel);
     }
     return lit(color, frame.environment_lighting, frame.background.xyz);
 }

@@ -9,7 +9,6 @@
 #import gs4d::conic::{conic_of, determinant_of, determinant_with_less, is_drawable, screen_covariance, LOW_PASS}
 #import gs4d::tile::{contributing_tiles, tiles_of}
 
-const MARGINAL_CUTOFF: f32 = 0.05;
 const FRUSTUM_CLAMP: f32 = 1.3;
 
 // A Gaussian on the screen. Of an invisible one only the key is defined.
@@ -42,7 +41,7 @@ fn marginal_of(dt: f32, inverse_sigma_t: f32) -> f32 {
 // Returns whether a Gaussian may be visible at the time of the instance.
 fn is_present(index: u32) -> bool {
     let lifespan = load_lifespan(index);
-    return marginal_of(instance.time - lifespan.x, lifespan.y) > MARGINAL_CUTOFF || instance.debug == DEBUG_ACTIVE;
+    return marginal_of(instance.time - lifespan.x, lifespan.y) > instance.marginal_cutoff || instance.debug == DEBUG_ACTIVE;
 }
 
 // Projects a Gaussian at the time of the instance.
@@ -53,12 +52,12 @@ fn projection_of(index: u32) -> Projection {
     let lifespan = load_lifespan(index);
     p.dt = instance.time - lifespan.x;
     var marginal = marginal_of(p.dt, lifespan.y);
-    p.absent = marginal <= MARGINAL_CUTOFF;
+    p.absent = marginal <= instance.marginal_cutoff;
     if p.absent {
         if instance.debug != DEBUG_ACTIVE {
             return p;
         }
-        marginal = MARGINAL_CUTOFF;
+        marginal = instance.marginal_cutoff;
     }
     let g = load_gaussian(index);
     p.gaussian = g;

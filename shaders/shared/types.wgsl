@@ -65,7 +65,9 @@ struct InstanceUniforms {
     binning: vec4<u32>,
     // Screen-space variances of one training pixel squared, at one pixel per camera unit.
     trained_variance: vec2<f32>,
-    padding: vec2<f32>,
+    // The marginal at and below which a Gaussian is not drawn.
+    marginal_cutoff: f32,
+    padding: f32,
     // Rows of capture-to-crop-box; the box is from -1 to 1.
     crop_x: vec4<f32>,
     crop_y: vec4<f32>,

@@ -1,7 +1,7 @@
 //! `gs4d export SCENE OUT`: writes files that other programs open.
 //!
-//! In: a scene, a time, or frames a second. Out: a file of the Gaussians at that time, a folder with a file for each frame, or a file with all motion; a
-//! report of what the files do not show.
+//! In: a scene, a time, or frames a second. Out: a file of the Gaussians at that time, a folder with a file for each frame, or a file with all
+//! motion; a report of what the files do not show.
 
 use super::args::{CheckpointArgs, Given, file_size, values};
 use super::failure::Failure;

@@ -98,7 +98,8 @@ impl Info {
         let facts = Facts::of_scene(&scene);
         let (extent, failure) = match scene.into_runtime() {
             Ok(scene) => {
-                let all = Bounds::of(scene.iter(), facts.trained_with.time_interval);
+                let TrainedWith { time_interval, marginal_cutoff, .. } = facts.trained_with;
+                let all = Bounds::of(scene.iter(), time_interval, marginal_cutoff, scene.filter.as_ref());
                 let core = Bounds::core(scene.iter());
                 (all.zip(core).map(|(all, core)| Extent { all, core }), None)
             }

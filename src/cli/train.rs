@@ -65,6 +65,10 @@ pub(super) struct Train {
     /// Degree of color in time, 0 to 2 [default: 2 if the spatial degree is 3].
     #[arg(long, value_name = "DEGREE", value_parser = clap::value_parser!(u32).range(0..=2))]
     sh_degree_t: Option<u32>,
+    /// Rows of the environment map that is trained behind the Gaussians, on a sphere with a radius of 60 units; 0: none [default: 128 if no image
+    /// has transparent pixels or masks, else none].
+    #[arg(long, value_name = "ROWS", value_parser = clap::value_parser!(u32).range(0..=4096))]
+    environment: Option<u32>,
     /// Number of training steps.
     #[arg(long, value_name = "N", default_value = "20000", value_parser = values::count(100_000_000))]
     steps: usize,
@@ -152,8 +156,11 @@ impl Train {
         };
         let speed = steps_per_second.map_or(String::new(), |speed| format!(", {speed:.1} steps per second"));
         let gaussians = scene.len();
+        let environment = scene.environment.as_ref().map(|map| [map.width, map.height]);
+        let map = environment.map_or("none".to_owned(), |[width, height]| format!("{width} x {height}"));
         let mut pairs = vec![
             ("trained", format!("{gaussians} Gaussians on {views} views, begun from {from} points{speed}")),
+            ("environment map", map),
             ("views", splits.clone()),
             ("PSNR", quality),
             ("wrote", format!("{}, {}", out.display(), bytes(size))),
@@ -169,6 +176,7 @@ impl Train {
             "bytes_out": size,
             "gaussians": gaussians,
             "start": from,
+            "environment": environment,
             "views": views,
             "validation": validation,
             "split": splits,
@@ -205,6 +213,7 @@ impl Train {
             seed: self.training.seed,
             degree: self.sh_degree,
             degree_t: self.sh_degree_t.unwrap_or(2),
+            environment: self.environment,
         }
     }
 

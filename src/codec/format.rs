@@ -7,7 +7,7 @@ use super::checkpoint;
 use super::error::CodecErrorKind;
 use super::fourdgs;
 use super::import::source::Source;
-use super::import::{ImportError, Imported, npz, ply, sequence, sog, splat, splatv, spz};
+use super::import::{ImportError, Imported, gltf, npz, ply, sequence, sog, splat, splatv, spz};
 use super::options::ReadOptions;
 use super::package::{self, PackageInfo, WriteSettings};
 use super::start::{Start, ZIP};
@@ -130,6 +130,15 @@ pub const FORMATS: &[Format] = &[
         write: None,
         inspect: None,
     },
+    Format {
+        id: "gltf",
+        name: "a glTF file with Gaussians (.glb or .gltf)",
+        extensions: &["glb", "gltf"],
+        is_of: gltf::is_of,
+        read: Read::Bytes(gltf::read),
+        write: None,
+        inspect: None,
+    },
     // The last row: nothing in such a file tells its format.
     Format {
         id: "splat",
@@ -154,6 +163,15 @@ impl Format {
         path.extension()
             .is_some_and(|found| self.extensions.iter().any(|extension| found.eq_ignore_ascii_case(extension)))
     }
+}
+
+/// Returns the extensions of files of other makes, without the dot.
+pub fn imported_extensions() -> Vec<&'static str> {
+    let imported = FORMATS.iter().filter(|format| matches!(format.read, Read::Bytes(_)));
+    let mut extensions: Vec<&str> = imported.flat_map(|format| format.extensions).copied().collect();
+    extensions.sort_unstable();
+    extensions.dedup();
+    extensions
 }
 
 /// Returns the message about a file of no known format.
@@ -210,7 +228,7 @@ mod tests {
         let expected = "neither a checkpoint of the 4DGS trainer (.pth, a zip archive), a package (.gs4d), an SPZ file (.spz), \
                         a capture of the player splaTV (.splatv), a SOG (.sog, .sogst, .sog4d, .tsog, or the meta.json or lod-meta.json \
                         of one), a capture of the 4dgs format (.4dgs), parameters of Dynamic 3D Gaussians (.npz), a PLY of Gaussians \
-                        (.ply), a folder of numbered PLY files nor a .splat file (.splat)";
+                        (.ply), a folder of numbered PLY files, a glTF file with Gaussians (.glb or .gltf) nor a .splat file (.splat)";
         assert_eq!(unknown(), expected, "every format by name and extension");
     }
 

@@ -26,6 +26,7 @@ use format::FORMATS;
 pub use format::Format;
 use format::Read;
 use import::Imported;
+use import::sequence;
 use import::source::{Beside, InFolder, Source};
 use package::{PackageInfo, WriteSettings};
 use start::Start;
@@ -56,7 +57,7 @@ pub(crate) fn load_stating(path: &Path, options: &ReadOptions) -> Result<Importe
                 let mut bytes = Vec::new();
                 file.read_to_end(&mut bytes)?;
                 let folder = path.parent().unwrap_or(Path::new(""));
-                Ok(read(&Source { path, bytes: &bytes, beside: &InFolder(folder) }, options)?)
+                Ok(read(&Source { bytes: &bytes, beside: &InFolder(folder) }, options)?)
             }
             (Read::Folder(read), _) => Ok(read(path, options)?),
             (Read::File(_) | Read::Bytes(_), None) => Err(CodecErrorKind::UnknownFormat(format::unknown_folder())),
@@ -77,9 +78,18 @@ pub(crate) fn read_bytes(
 ) -> Result<Imported, CodecErrorKind> {
     let start = Start::of(&mut Cursor::new(bytes), path)?;
     match Format::of(&start).map(|format| format.read) {
-        Some(Read::Bytes(read)) => Ok(read(&Source { path, bytes, beside }, options)?),
+        Some(Read::Bytes(read)) => Ok(read(&Source { bytes, beside }, options)?),
         Some(Read::File(_) | Read::Folder(_)) | None => Err(CodecErrorKind::UnknownFormat(format::unknown())),
     }
+}
+
+/// Reads the frames of a sequence, each the name and the bytes of a file, in order.
+///
+/// # Errors
+/// As [`read_bytes`], with the name of the frame.
+pub(crate) fn read_frames(frames: Vec<(String, Vec<u8>)>, options: &ReadOptions) -> Result<Imported, CodecErrorKind> {
+    let frames = frames.into_iter().map(|(name, bytes)| sequence::Frame { name, bytes: Box::new(move || Ok(bytes)) });
+    Ok(sequence::read(frames, options)?)
 }
 
 /// Returns the format of a file. If the files of that format have sections, all checksums are verified, and the header

@@ -47,6 +47,8 @@ pub struct ReadOptions {
     pub marginal_cutoff: Option<f32>,
     /// Frames a second of a sequence of files. Default: 30.
     pub fps: Option<f32>,
+    /// Whether the file is the first of several with numbered names, which are the frames of a sequence. Default: `false`.
+    pub sequence: bool,
     /// Largest distance between a curved path and the straight pieces that replace it, relative to the middle scale of the Gaussian.
     /// Default: 0.25.
     pub tolerance: Option<f32>,

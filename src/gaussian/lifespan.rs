@@ -9,9 +9,11 @@ pub const MARGINAL_CUTOFF: f32 = 0.05;
 /// The smallest cut-off: a splat with a lower marginal has an alpha below 1/255, which is never drawn.
 pub const SMALLEST_CUTOFF: f32 = 1.0 / 255.0;
 
-/// Distance in time from the temporal mean at which the marginal falls to [`MARGINAL_CUTOFF`], in temporal deviations:
-/// sqrt(−2 ln 0.05) = 2.4477, rounded up.
-pub(crate) const LIFESPAN: f64 = 2.4478;
+/// Returns the distance in time from the temporal mean at which the marginal falls to the cut-off, in temporal deviations: sqrt(−2 ln cutoff),
+/// rounded up.
+pub(crate) fn lifespan_reach(cutoff: f32) -> f64 {
+    (-2.0 * f64::from(cutoff).ln()).sqrt() * 1.0001
+}
 
 /// The opacity envelope of a Gaussian in time.
 #[derive(Debug, Clone, Copy, PartialEq)]

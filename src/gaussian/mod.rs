@@ -28,7 +28,7 @@ pub(crate) mod slice;
 pub use gradient::GradientMode;
 pub(crate) use gradient::{GradientSettings, ParameterGradient, SplatGradient, parameter_gradient};
 pub use harmonics::{Harmonics, ShDirection};
-pub(crate) use lifespan::LIFESPAN;
+pub(crate) use lifespan::lifespan_reach;
 pub use lifespan::{Lifespan, MARGINAL_CUTOFF, SMALLEST_CUTOFF};
 pub use parameters::{Model, Parameters};
 pub(crate) use slice::rotation_4d;

@@ -34,16 +34,16 @@ pub struct Projected {
     pub tiles: TileRect,
 }
 
-/// Projects one Gaussian; `None` if it is not drawn.
+/// Projects one Gaussian, with the cut-off of the original; `None` if it is not drawn.
 pub fn project(gaussian: &Gaussian, view: &View) -> Option<Projected> {
-    project_with(gaussian, view, &view.clip_rows())
+    project_with(gaussian, view, &view.clip_rows(), MARGINAL_CUTOFF)
 }
 
 /// Projects one of many Gaussians, as [`project`]; `clip` are the view's [`clip_rows`](View::clip_rows), computed once
-/// for all.
-pub fn project_with(gaussian: &Gaussian, view: &View, clip: &[Vec4; 2]) -> Option<Projected> {
+/// for all, `cutoff` is the marginal at and below which a Gaussian is not drawn.
+pub fn project_with(gaussian: &Gaussian, view: &View, clip: &[Vec4; 2], cutoff: f32) -> Option<Projected> {
     let marginal = gaussian.marginal(view.time);
-    if marginal <= MARGINAL_CUTOFF {
+    if marginal <= cutoff {
         return None;
     }
     let mean = gaussian.mean_at(view.time);

@@ -3,7 +3,8 @@
 //! In: a scene, a target form, color degrees. Out: the scene in that form, with those degrees.
 
 use super::OfflineError;
-use crate::scene::{ColorDegrees, Form, GaussianScene, SceneForm, TemporalFilter, merge_neighbors};
+use crate::scene::merge_neighbors::merge_neighbors;
+use crate::scene::{ColorDegrees, Form, GaussianScene, SceneForm, TemporalFilter};
 
 /// A form to convert to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -67,9 +67,9 @@ pub fn filter(
     progress: &mut dyn Progress,
 ) -> Result<TemporalFilter, OfflineError> {
     if !needs_views(kind) {
-        let interval = scene.trained_with.time_interval;
+        let (interval, cutoff) = (scene.trained_with.time_interval, scene.trained_with.marginal_cutoff);
         let gaussians = sliced(scene)?;
-        return Ok(TemporalFilter::support(gaussians.iter().copied(), interval, keys.max(2) - 1));
+        return Ok(TemporalFilter::support(gaussians.iter().copied(), interval, cutoff, keys.max(2) - 1));
     }
     let runtime = GaussianScene { filter: None, ..scene.clone() }.into_runtime()?;
     Pictures::looked_at(views).require(engine.headless(), BY_RESOLUTION)?;

@@ -61,7 +61,9 @@ pub fn project(layer: &Layer<'_>, space: BlendSpace) -> Vec<Splat> {
 fn project_one(layer: &Layer<'_>, index: usize, space: BlendSpace, clip: &[Vec4; 2]) -> Splat {
     let Layer { scene, view, appearance } = layer;
     let gaussian = &scene.gaussian(index);
-    let Some(projected) = project_with(gaussian, view, clip) else { return Splat::INVISIBLE };
+    let Some(projected) = project_with(gaussian, view, clip, scene.trained_with.marginal_cutoff) else {
+        return Splat::INVISIBLE;
+    };
     if !appearance.shows(projected.mean) {
         return Splat::INVISIBLE;
     }

@@ -101,8 +101,10 @@ pub struct InstanceUniforms {
     pub binning: [u32; 4],
     /// Screen-space variances of one training pixel squared, at one pixel per camera unit.
     pub trained_variance: [f32; 2],
+    /// The marginal at and below which a Gaussian is not drawn.
+    pub marginal_cutoff: f32,
     /// Unused.
-    pub padding: [f32; 2],
+    pub padding: f32,
     /// Rows of capture-to-crop-box: x.
     pub crop_x: [f32; 4],
     /// Row y.

@@ -2,7 +2,8 @@
 //!
 //! In: runtime Gaussians. Out: [`Bounds`] and [`BoundsOverTime`] in capture space.
 
-use crate::gaussian::{Gaussian, LIFESPAN};
+use super::filter::TemporalFilter;
+use crate::gaussian::{Gaussian, lifespan_reach};
 use glam::{DVec3, Vec3};
 
 /// Number of stretches of time, each with a box.
@@ -23,9 +24,15 @@ pub struct Bounds {
 
 impl Bounds {
     /// Returns the box that holds three standard deviations of every Gaussian wherever it is drawn within `interval`;
-    /// `None` if no Gaussian is drawn. Gaussians that cannot be drawn ([`Gaussian::check`]) are ignored.
-    pub fn of(gaussians: impl Iterator<Item = Gaussian>, interval: [f32; 2]) -> Option<Self> {
-        BoundsOverTime::with_stretches(gaussians, interval, 1).map(|bounds| bounds.whole)
+    /// `None` if no Gaussian is drawn. A Gaussian is drawn while its marginal is above `cutoff`, and in its window if `filter` is one of
+    /// [windows](super::FilterKind::Window). Gaussians that cannot be drawn ([`Gaussian::check`]) are ignored.
+    pub fn of(
+        gaussians: impl Iterator<Item = Gaussian>,
+        interval: [f32; 2],
+        cutoff: f32,
+        filter: Option<&TemporalFilter>,
+    ) -> Option<Self> {
+        BoundsOverTime::with_stretches(gaussians, interval, cutoff, filter, 1).map(|bounds| bounds.whole)
     }
 
     /// Returns the box around the middle nine tenths of the means, each at its own temporal mean, along each axis:
@@ -97,16 +104,34 @@ pub struct BoundsOverTime {
 impl BoundsOverTime {
     /// Returns the boxes that hold three standard deviations of every Gaussian wherever it is drawn, for 32 stretches
     /// of `interval` (one, if the interval has no length); `None` if no Gaussian is drawn. Gaussians that cannot be drawn
-    /// ([`Gaussian::check`]) are ignored.
-    pub fn of(gaussians: impl Iterator<Item = Gaussian>, interval: [f32; 2]) -> Option<Self> {
-        Self::with_stretches(gaussians, interval, TIME_SPANS)
+    /// ([`Gaussian::check`]) are ignored. A Gaussian is drawn as in [`Bounds::of`].
+    pub fn of(
+        gaussians: impl Iterator<Item = Gaussian>,
+        interval: [f32; 2],
+        cutoff: f32,
+        filter: Option<&TemporalFilter>,
+    ) -> Option<Self> {
+        Self::with_stretches(gaussians, interval, cutoff, filter, TIME_SPANS)
     }
 
-    fn with_stretches(gaussians: impl Iterator<Item = Gaussian>, interval: [f32; 2], stretches: usize) -> Option<Self> {
+    fn with_stretches(
+        gaussians: impl Iterator<Item = Gaussian>,
+        interval: [f32; 2],
+        cutoff: f32,
+        filter: Option<&TemporalFilter>,
+        stretches: usize,
+    ) -> Option<Self> {
+        let reach = lifespan_reach(cutoff);
         let count = if interval[0] < interval[1] { stretches } else { 1 };
         let mut extents = vec![Extent::EMPTY; count];
-        for gaussian in gaussians.filter(|gaussian| gaussian.check().is_ok()) {
-            cover(&mut extents, &gaussian, interval.map(f64::from));
+        for (index, gaussian) in gaussians.enumerate().filter(|(_, gaussian)| gaussian.check().is_ok()) {
+            let half = reach * f64::from(gaussian.sigma_t);
+            let [mut from, mut to] = [-half, half].map(|way| f64::from(gaussian.mean_t) + way);
+            if let Some(filter) = filter {
+                let [first, last] = filter.window(index, interval);
+                (from, to) = (from.max(first), to.min(last));
+            }
+            cover(&mut extents, &gaussian, [from, to], interval.map(f64::from));
         }
         let stretches: Vec<_> = extents.into_iter().map(Extent::bounds).collect();
         let whole = stretches.iter().flatten().copied().reduce(Bounds::union)?;
@@ -132,11 +157,10 @@ impl BoundsOverTime {
 }
 
 /// Grows the boxes of all stretches in which a Gaussian is drawn. It moves in a straight line, so its positions at the
-/// ends of its time in a stretch bound those in between.
-fn cover(extents: &mut [Extent], gaussian: &Gaussian, [start, end]: [f64; 2]) {
+/// ends of its time in a stretch bound those in between. It is drawn from the first to the last time given.
+fn cover(extents: &mut [Extent], gaussian: &Gaussian, [from, to]: [f64; 2], [start, end]: [f64; 2]) {
     let mean_t = f64::from(gaussian.mean_t);
-    let lifespan = LIFESPAN * f64::from(gaussian.sigma_t);
-    let (first, last) = (start.max(mean_t - lifespan), end.min(mean_t + lifespan));
+    let (first, last) = (start.max(from), end.min(to));
     if first > last {
         return;
     }
@@ -184,6 +208,7 @@ impl Extent {
 mod tests {
     use super::*;
     use crate::gaussian::MARGINAL_CUTOFF;
+    use crate::scene::{ActiveSets, FilterKind};
     use proptest::array::uniform3;
     use proptest::collection::vec;
     use proptest::prelude::*;
@@ -208,7 +233,7 @@ mod tests {
     }
 
     fn over_time(gaussians: &[Gaussian], interval: [f32; 2]) -> Option<BoundsOverTime> {
-        BoundsOverTime::of(gaussians.iter().copied(), interval)
+        BoundsOverTime::of(gaussians.iter().copied(), interval, MARGINAL_CUTOFF, None)
     }
 
     fn holds(outer: Bounds, inner: Bounds) -> bool {
@@ -247,6 +272,17 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_gaussian_is_bounded_in_its_window_only() {
+        let sets = ActiveSets::Intervals(vec![5 | 5 << 16]);
+        let window = TemporalFilter { kind: FilterKind::Window, segments: 10, count: 1, sets };
+        let bounds = |filter| Bounds::of([runner()].into_iter(), [0.0, 1.0], MARGINAL_CUTOFF, filter).expect("drawn");
+        let found = bounds(Some(&window));
+        assert!((found.min.x - 5.0).abs() < 0.1 && (found.max.x - 6.0).abs() < 0.1, "half a second to 0.6: {found:?}");
+        let other = TemporalFilter { kind: FilterKind::Interval, ..window.clone() };
+        assert_eq!(bounds(Some(&other)), bounds(None), "filters of other kinds say nothing about positions");
     }
 
     #[test]

@@ -29,20 +29,27 @@ impl Environment {
     /// # Panics
     /// If there are fewer than 3 × height × width values.
     pub fn sample(&self, origin: Vec3, direction: Vec3) -> Vec3 {
+        self.weights(origin, direction).map(|(texel, weight)| weight * self.texel(texel)).sum()
+    }
+
+    /// Returns the texels, by number in a plane, that [`sample`](Self::sample) combines, and their weights.
+    pub(crate) fn weights(&self, origin: Vec3, direction: Vec3) -> impl Iterator<Item = (usize, f32)> {
         let along = origin.dot(direction);
         // Rays from outside may miss the sphere: then the point of the ray nearest to it is used.
         let reach = -along + (along * along - (origin.length_squared() - RADIUS * RADIUS)).max(0.0).sqrt();
         let hit = origin + direction * reach;
         let u = hit.y.atan2(hit.x) / TAU + 0.5;
         let v = (hit.z / RADIUS).clamp(-1.0, 1.0).acos() / PI;
-        let (x, y) = (u * self.width as f32 - 0.5, v * self.height as f32 - 0.5);
-        let (x0, y0) = (x.floor(), y.floor());
-        let mut color = Vec3::ZERO;
-        for (i, j) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
-            let weight = (1.0 - (x - (x0 + i)).abs()) * (1.0 - (y - (y0 + j)).abs());
-            color += weight * self.texel(x0 + i, y0 + j);
-        }
-        color
+        let [width, height] = [self.width, self.height].map(|side| side as f32);
+        let across = self.width as usize;
+        let (x, y) = (u * width - 0.5, v * height - 0.5);
+        let corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)];
+        let texels = corners.map(|(i, j)| (x.floor() + i, y.floor() + j)).into_iter();
+        let inside = texels.filter(move |&(i, j)| i >= 0.0 && j >= 0.0 && i < width && j < height);
+        inside.map(move |(i, j)| {
+            let weight = (1.0 - (x - i).abs()) * (1.0 - (y - j).abs());
+            (j as usize * across + i as usize, weight)
+        })
     }
 
     /// Checks that there is a finite value for each channel of each texel.
@@ -60,13 +67,9 @@ impl Environment {
         Ok(())
     }
 
-    fn texel(&self, x: f32, y: f32) -> Vec3 {
-        if x < 0.0 || y < 0.0 || x >= self.width as f32 || y >= self.height as f32 {
-            return Vec3::ZERO;
-        }
+    fn texel(&self, index: usize) -> Vec3 {
         let plane = (self.width * self.height) as usize;
-        let at = y as usize * self.width as usize + x as usize;
-        let color = Vec3::new(self.texels[at], self.texels[plane + at], self.texels[2 * plane + at]);
+        let color = Vec3::from([0, 1, 2].map(|channel| self.texels[channel * plane + index]));
         color.clamp(Vec3::splat(-BRIGHTEST), Vec3::splat(BRIGHTEST))
     }
 }

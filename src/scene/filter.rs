@@ -3,7 +3,7 @@
 //! In: key-frames at even spacing over the time interval and, for each segment between two of them, a set of Gaussians. Out:
 //! [`TemporalFilter`], stored as bits or as intervals, whichever is smaller; drawing skips inactive Gaussians.
 
-use crate::gaussian::{Gaussian, MARGINAL_CUTOFF};
+use crate::gaussian::{Gaussian, lifespan_reach};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -70,9 +70,9 @@ impl TemporalFilter {
 
     /// Creates the support filter: Gaussian `i` is active in a segment if its marginal exceeds the cut-off anywhere in
     /// it. The marginal has one peak, so these segments are one interval. A margin covers rounding: an additional
-    /// active Gaussian changes no pixel. `interval` is the time interval of the capture, `segments` at least 1.
-    pub fn support(gaussians: impl Iterator<Item = Gaussian>, interval: [f32; 2], segments: u32) -> Self {
-        let reach = f64::from(-2.0 * MARGINAL_CUTOFF.ln()).sqrt() * 1.0001;
+    /// active Gaussian changes no pixel. `interval` is the time interval of the capture, `cutoff` its cut-off, `segments` at least 1.
+    pub fn support(gaussians: impl Iterator<Item = Gaussian>, interval: [f32; 2], cutoff: f32, segments: u32) -> Self {
+        let reach = lifespan_reach(cutoff);
         let span = f64::from(interval[1]) - f64::from(interval[0]);
         let intervals: Vec<u32> = gaussians
             .map(|gaussian| {
@@ -126,6 +126,20 @@ impl TemporalFilter {
     /// Returns the number of words of one set of bits for `count` Gaussians.
     pub fn words(count: usize) -> usize {
         count.div_ceil(32)
+    }
+
+    /// Returns the times between which Gaussian `index` exists; all times unless the filter is of [windows](FilterKind::Window).
+    ///
+    /// # Panics
+    /// If `index` is out of range.
+    pub(super) fn window(&self, index: usize, interval: [f32; 2]) -> [f64; 2] {
+        let (FilterKind::Window, ActiveSets::Intervals(words)) = (self.kind, &self.sets) else {
+            return [f64::NEG_INFINITY, f64::INFINITY];
+        };
+        let [start, end] = interval.map(f64::from);
+        let (first, last) = (words[index] & 0xffff, words[index] >> 16);
+        let time = |segment: u32| start + (end - start) * f64::from(segment) / f64::from(self.segments);
+        [time(first), time(last + 1)]
     }
 
     /// Returns the segment of `time`, which is in the capture's unit; see [`segment_of`].
@@ -271,6 +285,7 @@ pub fn segment_of(time: f32, interval: [f32; 2], segments: u32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gaussian::MARGINAL_CUTOFF;
 
     fn gaussian(mean_t: f32, sigma_t: f32) -> Gaussian {
         Gaussian { mean_t, sigma_t, opacity: 0.5, ..bytemuck::Zeroable::zeroed() }
@@ -281,7 +296,7 @@ mod tests {
         let gaussians: Vec<_> =
             (0..200).map(|i| gaussian(i as f32 / 150.0 - 0.1, 0.003 * (1 + i % 40) as f32)).collect();
         for segments in [1, 5, 10, 40] {
-            let filter = TemporalFilter::support(gaussians.iter().copied(), [0.0, 1.0], segments);
+            let filter = TemporalFilter::support(gaussians.iter().copied(), [0.0, 1.0], MARGINAL_CUTOFF, segments);
             for step in 0..=500 {
                 let time = step as f32 / 500.0;
                 let segment = filter.segment_of(time, [0.0, 1.0]);
@@ -300,7 +315,7 @@ mod tests {
     #[test]
     fn bits_and_intervals_store_the_same_sets() {
         let gaussians: Vec<_> = (0..70).map(|i| gaussian(i as f32 / 70.0, 0.05)).collect();
-        let filter = TemporalFilter::support(gaussians.into_iter(), [0.0, 1.0], 40);
+        let filter = TemporalFilter::support(gaussians.into_iter(), [0.0, 1.0], MARGINAL_CUTOFF, 40);
         assert!(matches!(filter.sets, ActiveSets::Intervals(_)), "forty segments are smaller as intervals");
         let bits = TemporalFilter { sets: ActiveSets::Bits(filter.to_bits()), ..filter.clone() };
         assert_eq!(bits.to_bits(), filter.to_bits(), "the same sets");

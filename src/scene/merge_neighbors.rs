@@ -16,11 +16,7 @@ const FIRST_COEFFICIENT: f32 = 0.282_094_8;
 /// Merges Gaussians. Two are alike if their means differ by at most `tolerance` of the root mean square of the scales, their covariances and
 /// opacities by at most this part of themselves, and their colors by at most `tolerance`, of 0 to 1, in each coefficient. Returns `None` if the
 /// filter does not have intervals for these Gaussians.
-pub(crate) fn merge_neighbors(
-    sliced: &Sliced,
-    filter: &TemporalFilter,
-    tolerance: f32,
-) -> Option<(Sliced, TemporalFilter)> {
+pub fn merge_neighbors(sliced: &Sliced, filter: &TemporalFilter, tolerance: f32) -> Option<(Sliced, TemporalFilter)> {
     let ActiveSets::Intervals(intervals) = &filter.sets else { return None };
     filter.check(sliced.gaussians.len()).ok()?;
     let mut frames = vec![Vec::new(); filter.segments as usize];

@@ -15,7 +15,7 @@
 //! ```
 //!
 //! This is what `blend` computes for a pixel, without the perspective within a splat and the low-pass of the screen. As
-//! there, a Gaussian with a marginal of 0.05 or less, or an alpha below 1/255, is skipped. Front to back by depth, the
+//! there, a Gaussian whose marginal is not above the cut-off, or an alpha below 1/255, is skipped. Front to back by depth, the
 //! transmittance is multiplied by `1 − alpha`; the Gaussian at which it falls to `1 − threshold` or below is hit. With
 //! a threshold of one half, this is the Gaussian whose depth is the median depth.
 //!
@@ -26,8 +26,8 @@
 //! hit.
 
 use super::{RuntimeScene, TemporalFilter};
+use crate::gaussian::Gaussian;
 use crate::gaussian::alpha::{ALPHA_MIN, visible};
-use crate::gaussian::{Gaussian, MARGINAL_CUTOFF};
 use glam::{Affine3A, DMat3, DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -81,12 +81,13 @@ impl RuntimeScene {
         let filter = self.filter.as_ref().filter(fits);
         let active = filter.map(|f| (f, f.segment_of(settings.time, self.trained_with.time_interval)));
         let is_active = |index| active.is_none_or(|(filter, segment)| filter.is_active(segment, index));
+        let cutoff = self.trained_with.marginal_cutoff;
         // Most Gaussians are absent at any one time: decoding all of them would take most of the time of a pick.
-        let is_present = |index| self.form.lifespan(index).marginal(settings.time) > MARGINAL_CUTOFF;
+        let is_present = |index| self.form.lifespan(index).marginal(settings.time) > cutoff;
         let mut crossed: Vec<(Crossing, usize)> = (0..self.len())
             .into_par_iter()
             .filter(|&index| is_active(index) && is_present(index))
-            .filter_map(|index| Some((ray.cross(&self.gaussian(index), settings)?, index)))
+            .filter_map(|index| Some((ray.cross(&self.gaussian(index), cutoff, settings)?, index)))
             .collect();
         crossed.sort_unstable_by(|(a, i), (b, k)| a.depth.total_cmp(&b.depth).then(i.cmp(k)));
         let mut transmittance = 1.0;
@@ -128,14 +129,14 @@ impl Ray {
         Some(Self { origin, along, across: [u, v], length })
     }
 
-    /// Returns the depth and alpha of a Gaussian on the ray; `None` if it is not visible there. The comparisons treat
-    /// NaN as not visible.
-    fn cross(&self, gaussian: &Gaussian, settings: &PickSettings) -> Option<Crossing> {
+    /// Returns the depth and alpha of a Gaussian on the ray; `None` if it is not visible there, as where its marginal is not above `cutoff`.
+    /// The comparisons treat NaN as not visible.
+    fn cross(&self, gaussian: &Gaussian, cutoff: f32, settings: &PickSettings) -> Option<Crossing> {
         let marginal = gaussian.marginal(settings.time);
         let mean = gaussian.mean_at(settings.time);
         let peak = gaussian.opacity * marginal * settings.opacity;
         let is_inside = |crop: Affine3A| crop.transform_point3(mean).abs().cmple(Vec3::ONE).all();
-        let is_there = marginal > MARGINAL_CUTOFF && peak >= ALPHA_MIN && settings.crop.is_none_or(is_inside);
+        let is_there = marginal > cutoff && peak >= ALPHA_MIN && settings.crop.is_none_or(is_inside);
         if !is_there {
             return None;
         }
@@ -203,7 +204,7 @@ mod tests {
                 [low, high] = if energy(low + third) < energy(high - third) { [low, high - third] } else { [low + third, high] };
             }
             let alpha = 0.9 * (-0.5 * energy(low)).exp();
-            match ray.cross(&gaussian, &PickSettings { time: 0.5, ..PickSettings::default() }) {
+            match ray.cross(&gaussian, 0.05, &PickSettings { time: 0.5, ..PickSettings::default() }) {
                 // Rounding of the covariance to f32 and ε are some 1e-6 of it, and its condition is below 200.
                 Some(crossing) => {
                     prop_assert!((crossing.depth - low).abs() < 1e-3, "depth {}, expected {low}", crossing.depth);

@@ -162,6 +162,7 @@ pub(super) fn check_levels(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gaussian::MARGINAL_CUTOFF;
 
     fn empty() -> RuntimeScene {
         RuntimeScene::sliced(Vec::new(), Harmonics { coefficients: 1, ..Harmonics::default() })
@@ -206,7 +207,10 @@ mod tests {
             vec![level(8.0, RuntimeScene { environment: Some(map.clone()), ..empty() })],
             vec![level(
                 8.0,
-                RuntimeScene { filter: Some(TemporalFilter::support(empty().iter(), [0.0, 1.0], 2)), ..empty() },
+                RuntimeScene {
+                    filter: Some(TemporalFilter::support(empty().iter(), [0.0, 1.0], MARGINAL_CUTOFF, 2)),
+                    ..empty()
+                },
             )],
             vec![level(8.0, RuntimeScene { trained_with: other, ..empty() })],
             (0..=MAX_LEVELS).map(|index| level(64.0 - index as f32, empty())).collect(),

@@ -326,7 +326,12 @@ fn a_capture_is_dropped_with_its_last_handle() {
 fn dressed() -> RuntimeScene {
     let scene = synthetic(200);
     let runtime = scene.clone().into_runtime().expect("a synthetic scene can be drawn");
-    let filter = TemporalFilter::support(runtime.iter(), scene.trained_with.time_interval, 5);
+    let filter = TemporalFilter::support(
+        runtime.iter(),
+        scene.trained_with.time_interval,
+        scene.trained_with.marginal_cutoff,
+        5,
+    );
     RuntimeScene { filter: Some(filter), ..runtime }
 }
 

@@ -14,6 +14,7 @@ mod film;
 mod frame_time;
 mod glass;
 mod golden;
+mod imports;
 mod inactive;
 mod inspector;
 mod late_hits;

@@ -245,7 +245,7 @@ fn halves_follow_a_resized_target() {
 fn both_eyes_share_one_active_list() {
     let mut filtered = crowd();
     let interval = filtered.trained_with.time_interval;
-    filtered.filter = Some(TemporalFilter::support(filtered.iter(), interval, 4));
+    filtered.filter = Some(TemporalFilter::support(filtered.iter(), interval, 0.05, 4));
     let Some(mut stereo) = StereoApp::new(&filtered, Transform::from_xyz(0.0, 0.0, 4.0), false) else { return };
     stereo.eyes(0.0);
     let made = activated(&stereo.app);

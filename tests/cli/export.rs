@@ -55,11 +55,11 @@ fn a_sequence_is_a_folder_that_opens_as_one_capture() {
     let arguments = arguments!["export", &scene, &frames, "--sequence", "--fps", "4", "--json"];
     let report = gs4d(&arguments).json();
     let files = report["files"].as_array().expect("a list of files");
-    assert_eq!(files.len(), 4, "four frames in one second");
+    assert_eq!(files.len(), 8, "eight frames in two seconds");
     let all: u64 = files.iter().filter_map(|file| file["gaussians"].as_u64()).sum();
     let info = gs4d(&arguments!["info", &frames, "--fps", "4", "--json"]).json();
     assert_eq!((&info["format"], &info["gaussians"]), (&"sequence".into(), &all.into()), "the Gaussians of all frames");
-    assert_eq!(info["switches"]["playback"]["duration_seconds"], 1.0, "its length");
+    assert_eq!(info["switches"]["playback"]["duration_seconds"], 2.0, "its length");
     gs4d(&arguments!["convert", &frames, folder.path().join("again.gs4d"), "--fps", "4"]).text();
 
     let before = contents(&frames);

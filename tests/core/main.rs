@@ -34,6 +34,7 @@ mod score;
 mod score_formula;
 mod sog;
 mod splatv;
+mod spz_and_gltf;
 mod thin;
 
 #[path = "../support"]

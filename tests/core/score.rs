@@ -237,7 +237,7 @@ fn the_highest_scores_are_kept_in_the_order_of_the_scene() {
     );
 
     let mut scene = synth(400);
-    scene.filter = Some(TemporalFilter::support(runtime(400).iter(), [0.0, 1.0], 10));
+    scene.filter = Some(TemporalFilter::support(runtime(400).iter(), [0.0, 1.0], 0.05, 10));
     let scores: Vec<f32> = (0..400).map(|i| ((i * 37) % 101) as f32).collect();
     let keep = highest(&scores, 150);
     let lowest = keep.iter().map(|&i| scores[i as usize]).fold(f32::INFINITY, f32::min);
@@ -273,7 +273,7 @@ fn interval_filters_contain_key_frame_filters_and_support_filters_contain_interv
     let between: Vec<View> = (0..30).map(|i| view(i as f32, (i as f32 + 0.5) / 30.0)).collect();
     let key_frame = key_frame_filter(&masks, count);
     let interval = interval_filter(&mut engine, &masks, &between, [0.0, 1.0], count, &mut NoProgress).expect("views");
-    let support = TemporalFilter::support(scene.iter(), [0.0, 1.0], segments);
+    let support = TemporalFilter::support(scene.iter(), [0.0, 1.0], 0.05, segments);
     let within = |a: &TemporalFilter, b: &TemporalFilter| a.to_bits().iter().zip(b.to_bits()).all(|(a, b)| a & !b == 0);
     assert!(
         within(&key_frame, &interval) && within(&interval, &support),

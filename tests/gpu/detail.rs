@@ -42,7 +42,8 @@ fn clumps() -> GaussianScene {
 
 /// Returns a view in which the bounding sphere of a scene has a diameter of `pixels` pixels.
 fn view(scene: &RuntimeScene, direction: Vec3, time: f32, pixels: f32) -> View {
-    let bounds = Bounds::of(scene.iter(), scene.trained_with.time_interval).expect("something is drawn");
+    let bounds = Bounds::of(scene.iter(), scene.trained_with.time_interval, scene.trained_with.marginal_cutoff, None)
+        .expect("something is drawn");
     let distance = 30.0 * bounds.radius();
     let focal = pixels / pixels_across(bounds.radius(), distance, 1.0);
     let side = pixels.ceil();

@@ -20,7 +20,12 @@ fn scene(count: usize, seed: u64) -> RuntimeScene {
 }
 
 fn with_support(scene: &RuntimeScene) -> RuntimeScene {
-    let filter = TemporalFilter::support(scene.iter(), scene.trained_with.time_interval, SEGMENTS);
+    let filter = TemporalFilter::support(
+        scene.iter(),
+        scene.trained_with.time_interval,
+        scene.trained_with.marginal_cutoff,
+        SEGMENTS,
+    );
     RuntimeScene { filter: Some(filter), ..scene.clone() }
 }
 

@@ -8,7 +8,8 @@ use crate::support::{golden, gpu};
 use bevy_gs4d::gaussian::{GradientMode, Harmonics, Parameters};
 use bevy_gs4d::internal::gaussian::ParameterGradient;
 use bevy_gs4d::internal::offline::fine_tune::{
-    GpuImage, Moments, NEIGHBORS, Sample, Trainer, adam, loss, neighbors, opacity_mask, regularization,
+    GpuImage, Moments, NEIGHBORS, Sample, Trainer, adam, environment_backward, loss, neighbors, opacity_mask,
+    regularization,
 };
 use bevy_gs4d::internal::scene::packed::encode::Bits;
 use bevy_gs4d::offline::dataset::CoveredImage;
@@ -17,7 +18,7 @@ use bevy_gs4d::offline::metrics::SquaredError;
 use bevy_gs4d::offline::quantize::{CompressSettings, compress};
 use bevy_gs4d::renderer::Headless;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
-use bevy_gs4d::scene::{GaussianScene, SceneForm, Trained};
+use bevy_gs4d::scene::{Environment, GaussianScene, SceneForm, Trained};
 use bevy_gs4d::view::{Background, Camera, Frame, Picture, RasterFov, View};
 use glam::{UVec2, Vec3};
 use serde_json::{Value, json};
@@ -101,6 +102,46 @@ fn gradients_match_the_original() {
         }
     }
     assert_eq!(compared, 2 * 5 * 8, "five views have gradients");
+}
+
+#[test]
+fn the_gradient_of_the_environment_map_matches_the_cpu_reference() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let Lesson { scene, views, .. } = Lesson::new(&mut headless);
+    let random = |i: usize, seed: usize| ((i * seed + seed) % 61) as f32 / 61.0;
+    let map = Environment { width: 24, height: 12, texels: (0..3 * 24 * 12).map(|i| random(i, 17)).collect() };
+    let scene = GaussianScene { environment: Some(map.clone()), ..scene };
+    let capture = headless.upload(&scene.clone().into_runtime().expect("the scene can be drawn")).expect("it fits");
+    let mut expected = vec![0.0; map.texels.len()];
+    let mut lessons = Vec::new();
+    for view in &views[..3] {
+        let frame = headless.render(&capture, view, Background::Environment).expect("the view is drawn");
+        let pixels: Vec<Vec3> = (0..frame.transmittance.len())
+            .map(|i| Vec3::new(random(i, 7), -random(i, 11), random(i, 13)) * 0.01)
+            .collect();
+        for (sum, own) in expected.iter_mut().zip(environment_backward(&map, view, &frame.transmittance, &pixels)) {
+            *sum += own;
+        }
+        lessons.push((view, pixels));
+    }
+    let found: Vec<Vec<f32>> = (0..2)
+        .map(|_| {
+            let mut trainer =
+                Trainer::new(&mut headless, scene.clone(), GradientMode::Exact).expect("it can be trained");
+            for (view, pixels) in &lessons {
+                let pixels: Vec<[f32; 4]> = pixels.iter().map(|pixel| [pixel.x, pixel.y, pixel.z, 0.0]).collect();
+                let depths = vec![0.0; pixels.len()];
+                trainer.accumulate_pixels(view, Background::Environment, &pixels, &depths).expect("the picture fits");
+            }
+            trainer.gradients().expect("gradients can be read").environment.expect("a map").texels
+        })
+        .collect();
+    let expected: Vec<f32> = expected.into_iter().map(|value| value as f32).collect();
+    let error = relative_error(&found[0], &expected);
+    assert!(expected.iter().any(|&value| value.abs() > 1e-3), "the map is seen");
+    // Texel coordinates depend on the inverse trigonometric functions of the driver, as in the golden views over a map.
+    assert!(error < 1e-3, "the gradient differs by {error:.1e}");
+    assert_eq!(found[0], found[1], "the sums are the same on every run");
 }
 
 /// A trained scene of a few hundred Gaussians, views of it, and its own pictures as their images.

@@ -5,7 +5,7 @@
 
 use crate::support::surfaces::depth_texture;
 use crate::support::{gpu, limited_device, packed_scene};
-use bevy_gs4d::gaussian::{Gaussian, Parameters};
+use bevy_gs4d::gaussian::{Gaussian, MARGINAL_CUTOFF, Parameters, SMALLEST_CUTOFF};
 use bevy_gs4d::internal::reference::{self, Splat};
 use bevy_gs4d::offline::quantize::compress;
 use bevy_gs4d::reference::Layer;
@@ -266,6 +266,27 @@ fn a_dynamic_scene_is_empty_at_distant_times() {
         assert_eq!(frame.counts, Counts::default(), "no splat is visible at {time}");
         assert_finite(&frame, &format!("at {time}"));
     }
+}
+
+#[test]
+fn the_cutoff_of_the_scene_decides_which_tails_are_drawn() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let view = look_from(EYE, UVec2::new(80, 60), 0.5);
+    let mut visible = Vec::new();
+    for cutoff in [SMALLEST_CUTOFF, MARGINAL_CUTOFF, 0.6] {
+        let mut scene = scene(3_000);
+        scene.trained_with.marginal_cutoff = cutoff;
+        scene.filter = Some(TemporalFilter::support(scene.iter(), [0.0, 1.0], cutoff, 8));
+        let capture = headless.upload(&scene).expect("upload");
+        let expected = reference::render(&scene, &view, BACKGROUND);
+        for design in [Design::GlobalSort, Design::TileBins] {
+            headless.set_design(design);
+            let frame = headless.render(&capture, &view, BACKGROUND).expect("render");
+            assert_equivalent(&frame, &expected, &format!("{design:?}, cut-off {cutoff}"));
+        }
+        visible.push(expected.counts.visible);
+    }
+    assert!(visible[0] > visible[1] && visible[1] > visible[2], "a lower cut-off shows more tails: {visible:?}");
 }
 
 #[test]

@@ -103,7 +103,8 @@ pub fn draw(scene: &RuntimeScene, by: DrawnBy) -> Result<(), String> {
     if by == DrawnBy::CpuAndGpu {
         designs::compare(scene, &limits, &expected)?;
     }
-    let bounds = BoundsOverTime::of(scene.iter(), [first, last]);
+    let bounds =
+        BoundsOverTime::of(scene.iter(), [first, last], scene.trained_with.marginal_cutoff, scene.filter.as_ref());
     let finite = |bounds: Bounds| bounds.min.is_finite() && bounds.max.is_finite();
     if bounds.and_then(|bounds| bounds.at(first)).is_none_or(finite) {
         Ok(())

@@ -128,7 +128,12 @@ pub fn scene(form: Form, seed: u64) -> RuntimeScene {
     let settings = SynthSettings { count, seed, degree: 1, degree_t: 0, duration_seconds: 2.0 };
     let mut scene = synthesize(&settings).into_runtime().expect("synthetic scenes can be drawn");
     if form == Form::Filtered {
-        scene.filter = Some(TemporalFilter::support(scene.iter(), scene.trained_with.time_interval, 4));
+        scene.filter = Some(TemporalFilter::support(
+            scene.iter(),
+            scene.trained_with.time_interval,
+            scene.trained_with.marginal_cutoff,
+            4,
+        ));
     }
     scene
 }

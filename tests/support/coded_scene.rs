@@ -32,6 +32,7 @@ pub fn coded_scene(count: usize, degree: u32, degree_t: u32) -> RuntimeScene {
     let span = scene.trained_with.time_span();
     let packed = PackedScene::encode(&sliced.gaussians, &BITS, PackedColors::Coded(colors), ends, span);
     let gaussians = (0..count).map(|index| packed.gaussian(index));
-    let filter = TemporalFilter::support(gaussians, scene.trained_with.time_interval, 9);
+    let filter =
+        TemporalFilter::support(gaussians, scene.trained_with.time_interval, scene.trained_with.marginal_cutoff, 9);
     RuntimeScene { form: Form::Packed(packed), filter: Some(filter), ..scene }
 }

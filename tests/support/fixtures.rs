@@ -46,7 +46,7 @@ pub fn synthetic(count: usize, seed: u64, filtered: bool) -> RuntimeScene {
     let mut scene = synthesize(&settings).into_runtime().expect("synthetic scenes can be drawn");
     if filtered {
         let interval = scene.trained_with.time_interval;
-        scene.filter = Some(TemporalFilter::support(scene.iter(), interval, 4));
+        scene.filter = Some(TemporalFilter::support(scene.iter(), interval, 0.05, 4));
     }
     scene
 }

@@ -20,7 +20,8 @@ pub fn scene(count: usize, degree: u32, degree_t: u32) -> RuntimeScene {
         gaussian.sigma_t = f32::INFINITY;
         gaussian.velocity = [0.0; 3];
     }
-    let filter = TemporalFilter::support(scene.iter(), scene.trained_with.time_interval, 9);
+    let filter =
+        TemporalFilter::support(scene.iter(), scene.trained_with.time_interval, scene.trained_with.marginal_cutoff, 9);
     scene.filter = Some(filter);
     scene
 }

@@ -5,6 +5,7 @@
 use super::values;
 use crate::cli::failure::Failure;
 use crate::cli::note::note;
+use crate::codec::import::Imported;
 use crate::codec::{self, ReadOptions};
 use crate::gaussian::ShDirection;
 use crate::offline::train::CaptureSettings;
@@ -99,15 +100,19 @@ impl CheckpointArgs {
         CaptureSettings { time_interval: self.time_interval, background }
     }
 
-    /// Opens a checkpoint or a package.
+    /// Opens a capture of any format, and notes what of it the scene does not show.
     ///
     /// # Errors
     /// Errors of the codec; options that contradict the training settings in a package.
     pub(crate) fn load(&self, path: &Path) -> Result<GaussianScene, Failure> {
-        Ok(codec::load(path, &self.options())?)
+        let Imported { scene, lost } = codec::load_stating(path, &self.options())?;
+        for sentence in lost {
+            note(&format!("note: {}: {sentence}", path.display()));
+        }
+        Ok(scene)
     }
 
-    /// Opens a checkpoint or a package to change it: as [`load`](Self::load), without levels of detail, which are of the scene as it is.
+    /// Opens a capture to change it: as [`load`](Self::load), without levels of detail, which are of the scene as it is.
     ///
     /// # Errors
     /// As [`load`](Self::load).
@@ -135,6 +140,7 @@ impl CheckpointArgs {
             marginal_cutoff: self.cutoff,
             fps: self.fps,
             tolerance: self.tolerance,
+            sequence: false,
         }
     }
 }

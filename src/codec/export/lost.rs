@@ -2,7 +2,7 @@
 //!
 //! In: a scene. Out: a sentence about each of its parts that other players do not know.
 
-use crate::gaussian::ShDirection;
+use crate::gaussian::{Model, ShDirection};
 use crate::scene::GaussianScene;
 
 /// Returns a sentence about each part of the scene that is not exported.
@@ -16,12 +16,16 @@ pub(crate) fn of(scene: &GaussianScene) -> Vec<String> {
     }
     if scene.trained_with.uses_fov_sentinel() {
         lost.push(
-            "The footprints of this capture were shaped by a wider field of view, which other players do not do: theirs differ slightly.".to_owned(),
+            "The footprints of this capture were shaped by a wider field of view, which other players do not know: theirs differ \
+             slightly."
+                .to_owned(),
         );
     }
-    if scene.trained_with.sh_direction == ShDirection::Canonical && scene.form.color_degrees().degree > 0 {
+    let (moves, degree) = (scene.model() != Some(Model::Static3d), scene.form.color_degrees().degree);
+    if moves && scene.trained_with.sh_direction == ShDirection::Canonical && degree > 0 {
         lost.push(
-            "View-dependent color of a moving Gaussian is that of the direction to its undisplaced mean; other players use the direction to where it is."
+            "View-dependent color of a moving Gaussian is that of the direction to its undisplaced mean; other players use the \
+             direction to where it is."
                 .to_owned(),
         );
     }

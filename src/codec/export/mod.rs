@@ -8,11 +8,17 @@
 mod clip;
 pub(crate) mod error;
 pub(crate) mod exporter;
+mod gltf;
 mod instant;
 mod lost;
 mod moving;
 mod ply;
+#[cfg(test)]
+mod samples;
 mod sog;
 mod splat;
+mod spz;
 mod still;
 pub(crate) mod table;
+mod usd;
+mod y_up;

@@ -2,8 +2,8 @@
 //!
 //! In: a scene. Out: [`Columns`] of all its Gaussians with [`Motion`], their color without harmonics in time, and what that loses.
 //!
-//! Harmonics in time are replaced by their mean over the times at which the Gaussian is visible, which is nearer to its color, weighted by opacity, than
-//! the color at its temporal mean, and than the color without them.
+//! Harmonics in time are replaced by their mean over the times at which the Gaussian is visible, which is nearer to its color, weighted by
+//! opacity, than the color at its temporal mean, and than the color without them.
 
 use super::error::ExportError;
 use super::still::Ready;

@@ -1,4 +1,4 @@
-//! PLY files of Gaussians: those of 3DGS, and those of FreeTimeGS with motion.
+//! PLY files of Gaussians: those of 3DGS, and those of `FreeTimeGS` with motion.
 //!
 //! In: [`Columns`]. Out: binary little-endian floats, with the properties of the original trainer in its order.
 
@@ -26,7 +26,7 @@ pub(super) fn write_instant(columns: &Columns, _: &Clip, writer: &mut dyn Write)
     Ok(())
 }
 
-/// Writes moving Gaussians as FreeTimeGS does: times and lifespans are parts of the clip.
+/// Writes moving Gaussians as `FreeTimeGS` does: times and lifespans are parts of the clip.
 ///
 /// # Errors
 /// Errors of the writer.

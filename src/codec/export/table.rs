@@ -4,7 +4,7 @@
 //! one row of [`EXPORTS`]; the function gets [`Columns`], so that it knows neither packed records nor harmonics in time.
 
 pub(crate) use super::clip::Clip;
-use super::{ply, sog, splat};
+use super::{gltf, ply, sog, splat, spz, usd};
 use crate::codec::fourdgs;
 use crate::codec::import::columns::Columns;
 use std::io::{self, Write};
@@ -33,7 +33,6 @@ pub(crate) enum What {
     /// Gaussians only a filter switches on and off are refused before.
     Moving(Writer),
     /// As `Moving`, with the temporal filter of the capture if it has one: its intervals must be written too.
-    #[expect(dead_code, reason = "for formats with windows of time, of which there is no row yet")]
     Windowed(Writer),
 }
 
@@ -42,7 +41,7 @@ pub(crate) type Writer = fn(&Columns, &Clip, &mut dyn Write) -> io::Result<()>;
 
 /// What all formats of the SOG family lose.
 const SOG: &str = "Scales and colors have 256 values, rotations 256 for each component, and at most 65,536 sets of coefficients above degree 0 are \
-                   kept; players take -Y as the axis that points up.";
+                   kept.";
 
 /// All formats.
 pub const EXPORTS: &[Export] = &[
@@ -71,6 +70,30 @@ pub const EXPORTS: &[Export] = &[
         ],
     },
     Export {
+        id: "spz",
+        name: "an SPZ file, version 3 (.spz)",
+        extension: "spz",
+        what: What::Instant(spz::write),
+        lost: &[
+            "An SPZ file has 256 values for each color channel, the opacity and each scale, which is from e^-10 to e^5.94.",
+            "An SPZ file has 32 values for each coefficient of degree 1 and 16 for each above, from -1 to 1.",
+        ],
+    },
+    Export {
+        id: "gltf",
+        name: "a binary glTF file (.glb)",
+        extension: "glb",
+        what: What::Instant(gltf::write),
+        lost: &[],
+    },
+    Export {
+        id: "usd",
+        name: "an OpenUSD text file (.usda)",
+        extension: "usda",
+        what: What::Windowed(usd::write),
+        lost: &[],
+    },
+    Export {
         id: "sog",
         name: "a SOG of PlayCanvas (.sog)",
         extension: "sog",
@@ -93,6 +116,13 @@ pub const EXPORTS: &[Export] = &[
             "A .4dgs file has 256 values for each color coefficient, and colors from 0 to 1.",
             "A .4dgs file does not have the axis that points up.",
         ],
+    },
+    Export {
+        id: "usd-frame",
+        name: "an OpenUSD text file of one time (.frame.usda)",
+        extension: "frame.usda",
+        what: What::Instant(usd::write),
+        lost: &[],
     },
 ];
 

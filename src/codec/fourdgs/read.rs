@@ -203,7 +203,6 @@ mod tests {
     use crate::gaussian::Gaussian;
     use crate::scene::{Form, SceneForm};
     use fourdgs::{SceneExtras, WriteOptions, write_to_vec};
-    use std::path::Path;
 
     /// Returns a file of 3 s with 40 Gaussians. Each exists during half a second if `windows` is set.
     fn file(windows: bool, extra: Vec<Vec<u8>>) -> (GaussianSet, Vec<u8>) {
@@ -231,7 +230,7 @@ mod tests {
     }
 
     fn read_file(bytes: &[u8]) -> Result<Imported, ImportError> {
-        let source = Source { path: Path::new("a.4dgs"), bytes, beside: &InMemory::default() };
+        let source = Source { bytes, beside: &InMemory::default() };
         read(&source, &ReadOptions::default())
     }
 

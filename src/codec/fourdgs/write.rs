@@ -96,7 +96,6 @@ mod tests {
     use crate::codec::import::source::{InMemory, Source};
     use crate::codec::options::ReadOptions;
     use crate::scene::{ActiveSets, Form, SceneForm, TemporalFilter, UpAxis};
-    use std::path::Path;
 
     #[test]
     fn a_written_file_is_read_as_the_same_gaussians() {
@@ -121,7 +120,7 @@ mod tests {
         };
         let mut bytes = Vec::new();
         write(&columns, &clip, &mut bytes).expect("a scene that fits");
-        let source = Source { path: Path::new("a.4dgs"), bytes: &bytes, beside: &InMemory::default() };
+        let source = Source { bytes: &bytes, beside: &InMemory::default() };
         let found = read(&source, &ReadOptions::default()).expect("a whole file");
         let SceneForm::Ready(Form::Sliced(sliced)) = &found.scene.form else { panic!("sliced") };
         let filter = found.scene.filter.as_ref().expect("windows");

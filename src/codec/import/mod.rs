@@ -7,6 +7,7 @@ pub(crate) mod columns;
 mod cubic;
 pub(crate) mod drawable;
 mod error;
+pub(crate) mod gltf;
 mod imported;
 pub(crate) mod in_pieces;
 pub(crate) mod npz;

@@ -175,7 +175,6 @@ mod tests {
     use crate::gaussian::Gaussian;
     use crate::scene::{Form, SceneForm};
     use std::io::Write;
-    use std::path::Path;
     use zip::write::SimpleFileOptions;
 
     const FRAMES: usize = 11;
@@ -220,7 +219,7 @@ mod tests {
     }
 
     fn read_file(bytes: &[u8]) -> Result<Imported, ImportError> {
-        let source = Source { path: Path::new("params.npz"), bytes, beside: &InMemory::default() };
+        let source = Source { bytes, beside: &InMemory::default() };
         read(&source, &ReadOptions::default())
     }
 

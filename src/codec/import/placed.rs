@@ -1,13 +1,12 @@
 //! Gaussians in another space: turned, mirrored, scaled, moved.
 //!
 //! In: [`Columns`] and an affine map. Out: the columns in the space that the map leads to, exactly, except that colors which depend on the direction
-//! are turned by the rotation nearest to a map that shears or stretches. `y_up` is the map to the spaces of formats whose up is +Y.
+//! are turned by the rotation nearest to a map that shears or stretches.
 
 use super::columns::Columns;
 use super::error::ImportError;
 use crate::gaussian::eigen::eigen;
 use crate::gaussian::rotate_harmonics::rotate_harmonics;
-use crate::scene::UpAxis;
 use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3, DVec4};
 use rayon::prelude::*;
 
@@ -47,20 +46,6 @@ pub(crate) fn place(columns: &mut Columns, map: &DAffine3) -> Result<bool, Impor
         rotate_harmonics(&mut columns.harmonics, nearest_turn(linear));
     }
     Ok(is_turn || columns.harmonics.degree == 0)
-}
-
-/// Maps from a space in which `up` points up to one in which +Y does.
-pub(crate) fn y_up(up: UpAxis) -> DAffine3 {
-    // Rotations by quarters of a circle, by their columns: no digit of a number changes.
-    let [x, y, z] = match up {
-        UpAxis::PosX => [DVec3::Y, DVec3::NEG_X, DVec3::Z],
-        UpAxis::NegX => [DVec3::NEG_Y, DVec3::X, DVec3::Z],
-        UpAxis::PosY => [DVec3::X, DVec3::Y, DVec3::Z],
-        UpAxis::NegY => [DVec3::X, DVec3::NEG_Y, DVec3::NEG_Z],
-        UpAxis::PosZ => [DVec3::X, DVec3::NEG_Z, DVec3::Y],
-        UpAxis::NegZ => [DVec3::X, DVec3::Z, DVec3::NEG_Y],
-    };
-    DAffine3::from_mat3(DMat3::from_cols(x, y, z))
 }
 
 /// Turns and scales covariances by an orthogonal matrix and a factor.
@@ -170,16 +155,6 @@ mod tests {
         for linear in [DMat3::ZERO, DMat3::from_diagonal(DVec3::new(1.0, 0.0, 1.0)), DMat3::IDENTITY * f64::NAN] {
             let map = DAffine3::from_mat3(linear);
             assert!(place(&mut columns(), &map).is_err(), "{linear} has no inverse");
-        }
-    }
-
-    #[test]
-    fn every_axis_that_points_up_is_rotated_to_y() {
-        use UpAxis::{NegX, NegY, NegZ, PosX, PosY, PosZ};
-        for up in [PosX, NegX, PosY, NegY, PosZ, NegZ] {
-            let map = y_up(up);
-            let to = map.transform_vector3(up.vector().as_dvec3());
-            assert_eq!((to, map.matrix3.determinant()), (DVec3::Y, 1.0), "{up:?} is rotated to +Y");
         }
     }
 

@@ -88,6 +88,15 @@ fn at(name: &str, error: ImportError) -> ImportError {
     }
 }
 
+/// Returns the name of the file that follows a frame: its number is one higher, with the same number of digits, or one more after 9, 99 and so
+/// on. Returns `None` for a name without a number.
+pub fn next(name: &str) -> Option<String> {
+    let (beginning, number) = number(name)?;
+    let ending = name.strip_prefix(beginning)?.trim_start_matches(|c: char| c.is_ascii_digit());
+    let digits = name.len() - beginning.len() - ending.len();
+    Some(format!("{beginning}{:0digits$}{ending}", number.checked_add(1)?))
+}
+
 /// Returns the beginning and the number of a name that a frame may have.
 fn number(name: &str) -> Option<(&str, u64)> {
     let stem = name.strip_suffix(".ply")?;
@@ -192,6 +201,19 @@ mod tests {
 
     fn refusal(files: &[(&str, Vec<u8>)]) -> String {
         read(frames(files).into_iter(), &ReadOptions::default()).expect_err("the sequence is refused").to_string()
+    }
+
+    #[test]
+    fn the_name_that_follows_a_frame_has_the_next_number() {
+        for (name, expected) in [
+            ("frame_0009.ply", Some("frame_0010.ply")),
+            ("9.compressed.ply", Some("10.compressed.ply")),
+            ("a1b099.ply", Some("a1b100.ply")),
+            ("frame.ply", None),
+            ("frame_1.spz", None),
+        ] {
+            assert_eq!(next(name).as_deref(), expected, "after {name}");
+        }
     }
 
     #[test]

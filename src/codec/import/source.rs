@@ -9,8 +9,6 @@ use std::path::Path;
 /// A file to read.
 #[derive(Clone, Copy)]
 pub(crate) struct Source<'a> {
-    /// Its path, for its extension and for messages.
-    pub path: &'a Path,
     /// Its bytes.
     pub bytes: &'a [u8],
     /// The other files.

@@ -87,7 +87,6 @@ mod tests {
     use super::*;
     use crate::codec::import::source::InMemory;
     use crate::scene::{Form, GaussianScene, SceneForm, UpAxis};
-    use std::path::Path;
 
     /// Returns the record of a red splat with these factors of its motion.
     fn record(motion: [f32; 9], turn: f32, width: f32) -> Vec<u8> {
@@ -112,7 +111,7 @@ mod tests {
     }
 
     fn read_file(bytes: &[u8], options: &ReadOptions) -> Result<Imported, ImportError> {
-        read(&Source { path: Path::new("a.splatv"), bytes, beside: &InMemory::default() }, options)
+        read(&Source { bytes, beside: &InMemory::default() }, options)
     }
 
     const PARTS: &str = r#"[{"type":"splat","size":4096,"texwidth":4096,"texheight":1,"cameras":[]}]"#;

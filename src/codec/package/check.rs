@@ -7,6 +7,7 @@ use super::error::PackageError;
 use super::header::{Header, LEVEL, StoredForm};
 use super::layout;
 use super::section::{FLOAT_PLANES, PACKAGE, Section};
+use crate::gaussian::SMALLEST_CUTOFF;
 use crate::gaussian::harmonics::{MAX_COEFFICIENTS, evaluated};
 use crate::scene::detail::check_sizes;
 use crate::scene::packed::MAX_ENTRIES;
@@ -106,6 +107,10 @@ impl Header {
         sane(
             trained.prefilter_var.is_finite() && trained.spatial_lr_scale.is_finite(),
             "a training setting (prefilter_var or spatial_lr_scale) that is not finite",
+        )?;
+        sane(
+            (SMALLEST_CUTOFF..1.0).contains(&trained.marginal_cutoff),
+            "a cut-off of the marginal that is not from 1/255 to below 1",
         )?;
         sane(
             trained.pixel.is_none_or(|pixel| pixel.is_finite() && pixel > 0.0),

@@ -6,7 +6,7 @@
 use super::attribute::Attribute;
 use super::error::PackageError;
 use super::section::Section;
-use crate::gaussian::{Gaussian, Model};
+use crate::gaussian::{Gaussian, MARGINAL_CUTOFF, Model};
 use crate::scene::packed::{COLOR_WORDS, MAX_STAGES, RECORD_WORDS};
 use crate::scene::{
     ActiveSets, ColorDegrees, FilterKind, Form, GaussianScene, PackedColors, PackedScene, PlaybackHints, SceneForm,
@@ -110,7 +110,7 @@ pub struct StoredFilter {
 }
 
 /// Names of the features that packages of this version may require.
-const FEATURES: [&str; 2] = ["packed", "filter"];
+const FEATURES: [&str; 3] = ["packed", "filter", "cutoff"];
 
 /// Size of an environment map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -133,7 +133,8 @@ impl Header {
     pub(super) fn of(scene: &GaussianScene) -> Self {
         let form = StoredForm::of(&scene.form);
         let ColorDegrees { coefficients, degree, degree_t } = scene.form.color_degrees();
-        let used = [matches!(form, StoredForm::Packed { .. }), scene.filter.is_some()];
+        let is_cut_elsewhere = scene.trained_with.marginal_cutoff != MARGINAL_CUTOFF;
+        let used = [matches!(form, StoredForm::Packed { .. }), scene.filter.is_some(), is_cut_elsewhere];
         let requires = FEATURES.iter().zip(used).filter(|(_, used)| *used).map(|(name, _)| (*name).to_owned());
         Self {
             generator: concat!("bevy_gs4d ", env!("CARGO_PKG_VERSION")).to_owned(),

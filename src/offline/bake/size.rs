@@ -123,7 +123,12 @@ fn size_of(inputs: &Inputs<'_>, kept: &[u32]) -> Result<u64, OfflineError> {
     let mut scene = select(&inputs.subject.scene, kept);
     let interval = scene.trained_with.time_interval;
     let gaussians = sliced(&scene)?.into_owned();
-    scene.filter = Some(TemporalFilter::support(gaussians.into_iter(), interval, inputs.key_frames() - 1));
+    scene.filter = Some(TemporalFilter::support(
+        gaussians.into_iter(),
+        interval,
+        scene.trained_with.marginal_cutoff,
+        inputs.key_frames() - 1,
+    ));
     let options = match inputs.tunes() {
         Some(_) => CompressSettings::suiting(settings.quality, kept.len()),
         None => CompressSettings::from(settings.quality),

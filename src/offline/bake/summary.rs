@@ -43,7 +43,7 @@ impl Facts<'_> {
     /// The package cannot be read back, the checkpoint has been removed.
     pub(super) fn report(self) -> Result<BakeReport, OfflineError> {
         let BakeSettings { checkpoint, data, out, .. } = self.settings;
-        let interval = self.trained_with.time_interval;
+        let (interval, cutoff) = (self.trained_with.time_interval, self.trained_with.marginal_cutoff);
         let times = even_times(interval, TIMES);
         let info = package::inspect(Cursor::new(self.package)).map_err(|error| OfflineError::at(out, error))?;
         let original = fs::metadata(checkpoint).map_err(|error| OfflineError::at(checkpoint, error))?;
@@ -63,7 +63,10 @@ impl Facts<'_> {
             stages: self.stages,
             sections: SectionSize::by_name(&info.header.sections),
             variances: VarianceHistogram::of(self.before, self.after),
-            activity: Change { before: Activity::of(self.before, &times), after: Activity::of(self.after, &times) },
+            activity: Change {
+                before: Activity::of(self.before, cutoff, &times),
+                after: Activity::of(self.after, cutoff, &times),
+            },
             filter_share: Some(filter_shares(self.filter, interval, &times)),
             times,
             trials: self.choice.tried,

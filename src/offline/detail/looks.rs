@@ -81,7 +81,7 @@ impl Sphere {
         let [first, last] = scene.trained_with.time_interval;
         // A still is drawn at its first timestamp only.
         let shown = if scene.playback.duration_seconds > 0.0 { [first, last] } else { [first, first] };
-        let bounds = Bounds::of(scene.iter(), shown)?;
+        let bounds = Bounds::of(scene.iter(), shown, scene.trained_with.marginal_cutoff, scene.filter.as_ref())?;
         let (center, radius) = (bounds.center(), bounds.radius());
         (center.is_finite() && radius.is_finite() && radius > 0.0).then_some(Self { bounds, center, radius, shown })
     }

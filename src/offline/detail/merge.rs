@@ -13,7 +13,7 @@ use super::rotation::Axes;
 use crate::gaussian::alpha::{ALPHA_MAX, ALPHA_MIN};
 use crate::gaussian::conic::LOW_PASS;
 use crate::gaussian::harmonics::time_cosine;
-use crate::gaussian::{Gaussian, Harmonics, LIFESPAN, Parameters};
+use crate::gaussian::{Gaussian, Harmonics, Parameters, lifespan_reach};
 use crate::scene::{Sliced, Trained};
 use glam::{DMat3, DMat4, DVec3, DVec4};
 use std::cmp::Ordering;
@@ -25,13 +25,22 @@ const LONGEST: f64 = 100.0;
 const AXES: usize = 8;
 
 /// Merges Gaussians to at most `count`, for pictures with pixels of `pixel` capture units. `interval` is the time interval of the capture,
-/// `radius` the radius of the sphere about its bounds. Gaussians that are never drawn are left out.
-pub(super) fn merge(sliced: &Sliced, interval: [f32; 2], radius: f32, count: usize, pixel: f64) -> Trained {
+/// `cutoff` the marginal at and below which a Gaussian is not drawn, `radius` the radius of the sphere about its bounds. Gaussians that are never
+/// drawn are left out.
+pub(super) fn merge(
+    sliced: &Sliced,
+    interval: [f32; 2],
+    cutoff: f32,
+    radius: f32,
+    count: usize,
+    pixel: f64,
+) -> Trained {
+    let reach = lifespan_reach(cutoff);
     let Sliced { gaussians, harmonics } = sliced;
     let interval = interval.map(f64::from);
     let low_pass = f64::from(LOW_PASS) * pixel * pixel;
     let all = gaussians.iter().enumerate();
-    let seen: Vec<Seen<'_>> = all.filter_map(|(index, one)| Seen::of(index, one, interval, low_pass)).collect();
+    let seen: Vec<Seen<'_>> = all.filter_map(|(index, one)| Seen::of(index, one, reach, interval, low_pass)).collect();
     let span = interval[1] - interval[0];
     let mut made = Trained {
         parameters: Parameters::default(),
@@ -59,9 +68,9 @@ struct Seen<'a> {
 
 impl<'a> Seen<'a> {
     /// Returns the Gaussian; `None` if it is never drawn.
-    fn of(index: usize, gaussian: &'a Gaussian, [start, end]: [f64; 2], low_pass: f64) -> Option<Self> {
+    fn of(index: usize, gaussian: &'a Gaussian, reach: f64, [start, end]: [f64; 2], low_pass: f64) -> Option<Self> {
         let sigma_t = f64::from(gaussian.sigma_t).min(LONGEST * (end - start));
-        let (mean_t, lifespan) = (f64::from(gaussian.mean_t), LIFESPAN * sigma_t);
+        let (mean_t, lifespan) = (f64::from(gaussian.mean_t), reach * sigma_t);
         let (from, to) = (start.max(mean_t - lifespan), end.min(mean_t + lifespan));
         let absorbed = thickness(f64::from(gaussian.opacity)) * area(covariance(gaussian), low_pass);
         let weight = absorbed * sigma_t.min(end - start);
@@ -103,7 +112,9 @@ impl Set {
             let spread = members.iter().map(|m| weight(m) * (place(m) - middle).powi(2)).sum::<f64>();
             (spread, axis, middle)
         };
-        let (spread, axis, middle) = (0..AXES).map(along).fold((0.0, 0, 0.0), |a, b| if b.0 > a.0 { b } else { a });
+        // The mean of one place can differ from it by rounding: a set of one is never divided.
+        let axes = if members.len() > 1 { 0..AXES } else { 0..0 };
+        let (spread, axis, middle) = axes.map(along).fold((0.0, 0, 0.0), |a, b| if b.0 > a.0 { b } else { a });
         Self { members, spread, axis, middle }
     }
 }
@@ -282,6 +293,7 @@ fn opacity_of(thick: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gaussian::MARGINAL_CUTOFF;
     use crate::gaussian::SliceSettings;
 
     const PIXEL: f64 = 0.05;
@@ -305,7 +317,8 @@ mod tests {
     }
 
     fn merged(gaussians: &[Gaussian], count: usize) -> (Vec<Gaussian>, Harmonics) {
-        let Trained { parameters, harmonics } = merge(&sliced(gaussians), [0.0, 1.0], 1.0, count, PIXEL);
+        let Trained { parameters, harmonics } =
+            merge(&sliced(gaussians), [0.0, 1.0], MARGINAL_CUTOFF, 1.0, count, PIXEL);
         (parameters.slice(&SliceSettings::default()).expect("it can be drawn"), harmonics)
     }
 
@@ -379,7 +392,7 @@ mod tests {
         let values: Vec<f32> = (0..2).flat_map(|_| (0..96).map(|at| if at < 48 { 0.0 } else { 1.0 })).collect();
         let harmonics = Harmonics { coefficients: 32, degree: 3, degree_t: 1, values };
         let both = Sliced { gaussians: vec![early, late], harmonics };
-        let made = merge(&both, [0.0, 1.0], 1.0, 1, PIXEL);
+        let made = merge(&both, [0.0, 1.0], MARGINAL_CUTOFF, 1.0, 1, PIXEL);
         let expected = time_cosine(1, 0.1, 1.0);
         let found = &made.harmonics.values[48..];
         assert!(found.iter().all(|value| (value - expected).abs() < 1e-5), "{} of {expected}", found[0]);

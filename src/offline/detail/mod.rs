@@ -178,7 +178,7 @@ impl Maker<'_> {
         let trained = &self.full.trained_with;
         let radius = self.sphere.radius;
         let pixel = 2.0 * f64::from(radius) / f64::from(pixels);
-        let merged = merge(sliced, trained.time_interval, radius, count, pixel);
+        let merged = merge(sliced, trained.time_interval, trained.marginal_cutoff, radius, count, pixel);
         let start = GaussianScene {
             form: SceneForm::Trained(merged),
             environment: None,

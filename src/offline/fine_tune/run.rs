@@ -15,7 +15,7 @@ use crate::offline::score::GpuEngine;
 use crate::offline::temporal_filter::seen_filter;
 use crate::offline::{OfflineError, Progress, sliced};
 use crate::renderer::{GpuError, Headless, ShaderChecks};
-use crate::scene::{FilterKind, GaussianScene, RuntimeScene, TemporalFilter};
+use crate::scene::{FilterKind, GaussianScene, RuntimeScene, TemporalFilter, TrainedWith};
 use crate::view::{Background, Frame, View};
 use glam::Vec3;
 
@@ -107,8 +107,9 @@ impl<'a> Run<'a> {
     pub(super) fn scene(&self) -> Result<GaussianScene, OfflineError> {
         let mut scene = self.trainer.scene()?;
         if let Some(segments) = self.support {
-            let interval = scene.trained_with.time_interval;
-            scene.filter = Some(TemporalFilter::support(sliced(&scene)?.iter().copied(), interval, segments));
+            let TrainedWith { time_interval, marginal_cutoff, .. } = scene.trained_with;
+            let gaussians = sliced(&scene)?.into_owned().into_iter();
+            scene.filter = Some(TemporalFilter::support(gaussians, time_interval, marginal_cutoff, segments));
         }
         Ok(scene)
     }

@@ -22,6 +22,8 @@ pub struct Rates {
     pub color: f64,
     /// Of the other color coefficients.
     pub harmonics: f64,
+    /// Of the environment map; 0 keeps it as it is.
+    pub environment: f64,
 }
 
 impl Rates {
@@ -34,6 +36,7 @@ impl Rates {
         opacity: 0.05,
         color: 2.5e-3,
         harmonics: 1.25e-4,
+        environment: 2.5e-3,
     };
 
     /// Ours: the mean moves as fast as when training begins, since the Gaussians that are left spread into the place of the others.

@@ -10,6 +10,7 @@
 //! | the passes of the global sort | records, color | splats, pairs, picture |
 //! | `loss` | picture, image | gradients of pixels, sums |
 //! | `blend_backward` | splats, pairs, gradients of pixels | gradients of pairs |
+//! | `environment_backward` | gradients of pixels, transmittance | gradients of the environment map, if the scene has one |
 //! | `project_backward` | gradients of pairs, parameters | gradients of raw parameters, added up over a batch; which Gaussians were seen |
 //! | `regularize` | parameters, their slice, neighbors | gradients of raw parameters, if there are [`Terms`] of Gaussians alone |
 //! | `adam` | gradients, moments | parameters; of Gaussians that were seen only, if steps are [sparse](Trainer::set_sparse) |
@@ -33,6 +34,7 @@ use super::sums::GradientSums;
 use super::terms::Terms;
 use super::tied::Tied;
 use super::totals::{Faults, Totals};
+use super::trained_environment::TrainedEnvironment;
 use super::trainer_error::TrainerError;
 use crate::gaussian::harmonics::evaluated;
 use crate::gaussian::{GradientMode, Model};
@@ -43,7 +45,7 @@ use crate::offline::shaders::{COMPAT, COMPAT_WITHOUT_TIME};
 use crate::renderer::memory::binding_limit;
 use crate::renderer::{GpuCapture, GpuError, Headless, ShaderChecks};
 use crate::scene::packed::encode::Bits;
-use crate::scene::{GaussianScene, SceneForm, TemporalFilter, Trained};
+use crate::scene::{Environment, GaussianScene, SceneForm, TemporalFilter, Trained};
 use crate::view::{Background, Frame, View};
 use std::collections::VecDeque;
 
@@ -73,6 +75,7 @@ pub struct Trainer<'a> {
     scene: GaussianScene,
     parameters: ParameterBuffers,
     backward: Backward,
+    environment: Option<TrainedEnvironment>,
     tied: Option<Tied>,
     /// Weight of the term of the mask.
     mask_weight: f32,
@@ -126,6 +129,12 @@ impl<'a> Trainer<'a> {
         let settings = scene_settings(model, count, scene.trained_with.prefilter_var);
         let parameters = ParameterBuffers::new(headless, &passes, settings, &records, stride, writable);
         let backward = Backward::new(headless, sums);
+        let environment = match (&scene.environment, capture.environment()) {
+            (Some(Environment { texels, .. }), Some(map)) => {
+                Some(TrainedEnvironment::new(headless, &passes, &parameters.notes, map, texels)?)
+            }
+            _ => None,
+        };
         let trainer = Self {
             headless,
             passes,
@@ -133,6 +142,7 @@ impl<'a> Trainer<'a> {
             scene,
             parameters,
             backward,
+            environment,
             tied: None,
             mask_weight: 0.0,
             regularizer: None,
@@ -208,7 +218,7 @@ impl<'a> Trainer<'a> {
     /// # Errors
     /// A picture or pairs that do not fit the GPU, an image of another size than its view.
     pub fn accumulate(&mut self, batch: &[Sample<'_>], similarity_share: f64) -> Result<(), GpuError> {
-        let Self { headless, passes, capture, parameters, backward, mask_weight, .. } = self;
+        let Self { headless, passes, capture, parameters, backward, environment, mask_weight, .. } = self;
         let share = 1.0 / batch.len().max(1) as f32;
         for sample in batch {
             if sample.image.size != sample.view.size {
@@ -234,6 +244,9 @@ impl<'a> Trainer<'a> {
             queue.write_buffer(&buffers.loss_settings, 0, bytemuck::bytes_of(&settings));
             parameters.write_scene(queue, sample.number);
             buffers.record(&mut encoder, headless, passes, capture, parameters, Some(sample.image));
+            if let Some(environment) = environment.as_ref().filter(|_| sample.background == Background::Environment) {
+                environment.record_scatter(&mut encoder, headless, &buffers.pixel_gradients, sample.view.size);
+            }
             queue.submit([encoder.finish()]);
         }
         Ok(())
@@ -250,7 +263,7 @@ impl<'a> Trainer<'a> {
         pixels: &[[f32; 4]],
         depths: &[f32],
     ) -> Result<(), GpuError> {
-        let Self { headless, passes, capture, parameters, backward, .. } = self;
+        let Self { headless, passes, capture, parameters, backward, environment, .. } = self;
         headless.draw(capture, view, background)?;
         let Some(buffers) = backward.fit(headless, passes, parameters, view.size)? else { return Ok(()) };
         let queue = &headless.context().queue;
@@ -259,6 +272,9 @@ impl<'a> Trainer<'a> {
         parameters.write_scene(queue, 0);
         let mut encoder = encoder(headless, "gs4d view");
         buffers.record(&mut encoder, headless, passes, capture, parameters, None);
+        if let Some(environment) = environment.as_ref().filter(|_| background == Background::Environment) {
+            environment.record_scatter(&mut encoder, headless, &buffers.pixel_gradients, view.size);
+        }
         queue.submit([encoder.finish()]);
         Ok(())
     }
@@ -334,7 +350,7 @@ impl<'a> Trainer<'a> {
         step: usize,
         growth: Option<StepGrowth>,
     ) -> Result<(), GpuError> {
-        let Self { headless, passes, parameters, tied, sparse, .. } = &*self;
+        let Self { headless, passes, parameters, environment, tied, sparse, .. } = &*self;
         let ParameterBuffers { geometry, color, .. } = parameters;
         let colors = rates.of_harmonics(factor);
         let spatial_lr_scale = self.scene.trained_with.spatial_lr_scale;
@@ -360,6 +376,9 @@ impl<'a> Trainer<'a> {
             for (optimized, rates, extent) in rated {
                 optimized.record_step(queue, &mut pass, passes, rates, step, extent);
             }
+            if let Some(environment) = environment {
+                environment.record_step(queue, &mut pass, passes, (rates.environment * factor) as f32, step);
+            }
             if let (Some(grower), Some(StepGrowth { noise, least_time_scale, seed, .. })) = (&self.grower, growth) {
                 let strength = (noise * rates.mean * spatial_lr_scale * factor) as f32;
                 let least = least_time_scale * f64::from(self.scene.trained_with.time_span());
@@ -371,6 +390,9 @@ impl<'a> Trainer<'a> {
                 tied.record_expand(&mut pass, passes, color);
             }
             self.record_slice(&mut pass);
+        }
+        if let Some(environment) = environment {
+            environment.record_show(&mut encoder);
         }
         parameters.forget_seen(&mut encoder);
         let index = queue.submit([encoder.finish()]);
@@ -465,17 +487,19 @@ impl<'a> Trainer<'a> {
     pub fn scene(&self) -> Result<GaussianScene, GpuError> {
         let ParameterBuffers { geometry, color, .. } = &self.parameters;
         let (records, values) = (geometry.read_values(self.headless)?, color.read_values(self.headless)?);
-        Ok(self.with(&records, &values))
+        let texels = self.environment.as_ref().map(|map| map.texels(self.headless)).transpose()?;
+        Ok(self.with(&records, &values, texels))
     }
 
-    /// Returns the gradients accumulated since the last step, as raw parameters and color coefficients.
+    /// Returns the gradients accumulated since the last step, as raw parameters, color coefficients and texels of the environment map.
     ///
     /// # Errors
     /// A lost device.
     pub fn gradients(&self) -> Result<GaussianScene, GpuError> {
         let ParameterBuffers { geometry, color, .. } = &self.parameters;
         let (records, values) = (geometry.read_gradients(self.headless)?, color.read_gradients(self.headless)?);
-        let mut gradients = self.with(&records, &values);
+        let texels = self.environment.as_ref().map(|map| map.gradients(self.headless)).transpose()?;
+        let mut gradients = self.with(&records, &values, texels);
         if let SceneForm::Trained(Trained { harmonics, .. }) = &mut gradients.form {
             let (used, own) = (harmonics.evaluated() * 3, harmonics.coefficients * 3);
             // Coefficients that are not evaluated change nothing.
@@ -484,9 +508,12 @@ impl<'a> Trainer<'a> {
         Ok(gradients)
     }
 
-    /// Returns the scene with these records and color coefficients, as they are on the GPU.
-    fn with(&self, records: &[u8], values: &[u8]) -> GaussianScene {
+    /// Returns the scene with these records and color coefficients, as they are on the GPU, and these texels of the environment map.
+    fn with(&self, records: &[u8], values: &[u8], texels: Option<Vec<f32>>) -> GaussianScene {
         let mut scene = self.scene.clone();
+        if let (Some(map), Some(texels)) = (&mut scene.environment, texels) {
+            map.texels = texels;
+        }
         if let SceneForm::Trained(Trained { parameters, harmonics }) = &mut scene.form {
             let records: Vec<TrainedRecord> = bytemuck::pod_collect_to_vec(records);
             set_parameters(parameters, &records);
@@ -525,6 +552,11 @@ impl<'a> Trainer<'a> {
         if let Some(regularizer) = &mut self.regularizer {
             regularizer.resume(self.headless, &state.neighbors);
         }
+        if let Some(environment) = &self.environment {
+            let mut encoder = encoder(self.headless, "gs4d environment");
+            environment.record_show(&mut encoder);
+            self.headless.context().queue.submit([encoder.finish()]);
+        }
         self.expand();
         self.slice();
         true
@@ -533,7 +565,8 @@ impl<'a> Trainer<'a> {
     /// Returns the buffers of a state, in its order.
     fn stored(&self) -> Vec<&wgpu::Buffer> {
         let ParameterBuffers { geometry, color, .. } = &self.parameters;
-        let all = [Some(geometry), Some(color), self.tied.as_ref().map(|tied| &tied.entries)];
+        let environment = self.environment.as_ref().map(|environment| &environment.values);
+        let all = [Some(geometry), Some(color), environment, self.tied.as_ref().map(|tied| &tied.entries)];
         let optimized = all.into_iter().flatten().flat_map(Optimized::stored);
         optimized.chain(self.rounder.as_ref().map(|rounder| &rounder.changes)).collect()
     }
@@ -543,6 +576,9 @@ impl<'a> Trainer<'a> {
         let mut encoder = encoder(self.headless, "gs4d moments");
         self.parameters.geometry.forget_moments(&mut encoder);
         self.parameters.color.forget_moments(&mut encoder);
+        if let Some(environment) = &self.environment {
+            environment.values.forget_moments(&mut encoder);
+        }
         self.headless.context().queue.submit([encoder.finish()]);
     }
 

@@ -7,7 +7,7 @@
 //! the interval, differs in curvature alone. The temporal mean moves by whole intervals, the period of the time harmonics. Colors are evaluated
 //! in the direction of the mean, which moves too: they change where the mean moves by much of the distance to the camera.
 
-use crate::gaussian::{Gaussian, MARGINAL_CUTOFF};
+use crate::gaussian::Gaussian;
 use rayon::prelude::*;
 
 /// Temporal means up to this distance from the middle of the time interval are not moved, lengths of the interval.
@@ -19,17 +19,17 @@ const CHANGE: f64 = 0.002;
 /// Largest temporal deviation, lengths of the interval: the packed form has one range for all, and longer deviations look nearly the same.
 const LONG: f64 = 1000.0;
 
-/// Moves temporal means that are far from the interval close to it.
-pub(super) fn move_near(gaussians: &mut [Gaussian], interval: [f32; 2]) {
+/// Moves temporal means that are far from the interval close to it. `cutoff` is the marginal at and below which a Gaussian is not drawn.
+pub(super) fn move_near(gaussians: &mut [Gaussian], interval: [f32; 2], cutoff: f32) {
     let [start, end] = interval.map(f64::from);
     let (middle, span) = (0.5 * (start + end), end - start);
     // The interval of a still has no length.
     if span > 0.0 {
-        gaussians.par_iter_mut().for_each(|gaussian| move_one(gaussian, middle, span));
+        gaussians.par_iter_mut().for_each(|gaussian| move_one(gaussian, middle, span, cutoff));
     }
 }
 
-fn move_one(gaussian: &mut Gaussian, middle: f64, span: f64) {
+fn move_one(gaussian: &mut Gaussian, middle: f64, span: f64, cutoff: f32) {
     let away = f64::from(gaussian.mean_t) - middle;
     let distance = away.abs();
     if distance <= FAR * span {
@@ -44,7 +44,7 @@ fn move_one(gaussian: &mut Gaussian, middle: f64, span: f64) {
     let near = (distance - ((distance - nearest) / span).floor() * span).clamp(nearest, nearest + span);
     let largest_marginal = (-0.5 * ((distance - 0.5 * span) / sigma_t).powi(2)).exp();
     gaussian.mean_t = (middle + near.copysign(away)) as f32;
-    if largest_marginal <= f64::from(MARGINAL_CUTOFF) {
+    if largest_marginal <= f64::from(cutoff) {
         gaussian.opacity = 0.0;
         gaussian.sigma_t = sigma_t.min(LONG * span) as f32;
         return;
@@ -65,6 +65,7 @@ fn move_one(gaussian: &mut Gaussian, middle: f64, span: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gaussian::MARGINAL_CUTOFF;
 
     fn gaussian(mean_t: f32, sigma_t: f32) -> Gaussian {
         Gaussian {
@@ -80,7 +81,7 @@ mod tests {
 
     fn moved(mean_t: f32, sigma_t: f32, interval: [f32; 2]) -> Gaussian {
         let mut one = [gaussian(mean_t, sigma_t)];
-        move_near(&mut one, interval);
+        move_near(&mut one, interval, MARGINAL_CUTOFF);
         one[0]
     }
 
@@ -133,7 +134,7 @@ mod tests {
     fn gaussians_of_constant_opacity_keep_it() {
         let before = Gaussian { velocity: [0.0; 3], ..gaussian(1e6, f32::INFINITY) };
         let mut after = [before];
-        move_near(&mut after, [0.0, 1.0]);
+        move_near(&mut after, [0.0, 1.0], MARGINAL_CUTOFF);
         assert_eq!(after[0], Gaussian { mean_t: after[0].mean_t, ..before }, "only the temporal mean is moved");
         assert!(after[0].mean_t <= 4.5, "it is near the interval: {}", after[0].mean_t);
     }

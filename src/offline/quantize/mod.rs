@@ -24,6 +24,7 @@ use crate::scene::packed::MAX_STAGES;
 use crate::scene::packed::encode::Bits;
 use crate::scene::{
     CodedColors, FilterKind, Form, GaussianScene, PackedColors, PackedScene, RuntimeScene, SceneForm, TemporalFilter,
+    TrainedWith,
 };
 use codebook::Centers;
 use ndarray::Array2;
@@ -157,7 +158,8 @@ pub(crate) fn train_codebooks(scene: &RuntimeScene, settings: &CompressSettings)
 /// Returns a scene whose temporal means are close to the time interval, if its geometry is quantized.
 fn anchored(mut scene: RuntimeScene, settings: &CompressSettings) -> RuntimeScene {
     if let (Form::Sliced(sliced), Some(_)) = (&mut scene.form, &settings.geometry) {
-        anchor::move_near(&mut sliced.gaussians, scene.trained_with.time_interval);
+        let TrainedWith { time_interval, marginal_cutoff, .. } = scene.trained_with;
+        anchor::move_near(&mut sliced.gaussians, time_interval, marginal_cutoff);
     }
     scene
 }
@@ -206,7 +208,12 @@ fn compress_by(
         // Lifespans are rounded too: the filter must be exact for the Gaussians that are drawn.
         FilterKind::Support => {
             let gaussians = (0..packed.len()).map(|index| packed.gaussian(index));
-            TemporalFilter::support(gaussians, scene.trained_with.time_interval, filter.segments)
+            TemporalFilter::support(
+                gaussians,
+                scene.trained_with.time_interval,
+                scene.trained_with.marginal_cutoff,
+                filter.segments,
+            )
         }
         FilterKind::KeyFrame | FilterKind::Interval | FilterKind::Window => filter.select(&order),
     });

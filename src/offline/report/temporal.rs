@@ -3,7 +3,7 @@
 //! In: runtime Gaussians before and after. Out: the distribution of their temporal variances, the fraction that is active at each time, and the
 //! overlap of each active set with the first set.
 
-use crate::gaussian::{Gaussian, MARGINAL_CUTOFF};
+use crate::gaussian::Gaussian;
 use crate::scene::TemporalFilter;
 use serde::Serialize;
 
@@ -55,9 +55,9 @@ pub struct Activity {
 }
 
 impl Activity {
-    /// Computes fraction and overlap at each of `times`.
-    pub fn of(gaussians: &[Gaussian], times: &[f32]) -> Self {
-        let active = |time: f32| gaussians.iter().map(move |g| g.marginal(time) > MARGINAL_CUTOFF);
+    /// Computes fraction and overlap at each of `times`. A Gaussian is active while its marginal is above `cutoff`.
+    pub fn of(gaussians: &[Gaussian], cutoff: f32, times: &[f32]) -> Self {
+        let active = |time: f32| gaussians.iter().map(move |g| g.marginal(time) > cutoff);
         let first: Vec<bool> = times.first().map(|&time| active(time).collect()).unwrap_or_default();
         let (mut share, mut overlap) = (Vec::new(), Vec::new());
         for &time in times {
@@ -121,7 +121,7 @@ mod tests {
     #[test]
     fn overlap_starts_at_one_and_ends_with_the_first_set() {
         let gaussians = [gaussian(0.0, 0.1), gaussian(1.0, 0.1), gaussian(0.5, 10.0)];
-        let activity = Activity::of(&gaussians, &even_times([0.0, 1.0], 3));
+        let activity = Activity::of(&gaussians, 0.05, &even_times([0.0, 1.0], 3));
         assert_eq!(activity.overlap, [1.0, 0.5, 1.0 / 3.0], "only the Gaussian of long lifespan is active throughout");
         assert!(
             (activity.share[1] - 1.0 / 3.0).abs() < 1e-12,

@@ -27,6 +27,11 @@ pub enum StartError {
     /// There are no silhouettes.
     #[error("the images have no transparent pixels and no masks, so that they have no hull: give --start random")]
     NoSilhouettes,
+    /// Images that do not show what is behind the scene.
+    #[error(
+        "the images have transparent pixels or masks, which do not show what is behind the scene: leave out --environment, or give 0"
+    )]
+    NoSurroundings,
     /// There is nothing inside the silhouettes.
     #[error(
         "no point is inside the silhouettes of the views of a moment (masks or poses of another scene?): give --start random to begin without them"

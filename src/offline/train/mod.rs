@@ -7,6 +7,7 @@
 //! | `capture` | the settings of a capture that follow from its views: interval of time, extent of the cameras, the axis that points up |
 //! | `region` | the box that the cameras look at |
 //! | `start` | the Gaussians before the first step, from points |
+//! | `surroundings` | the environment map before the first step |
 //! | `hull` | points inside the silhouettes of a moment |
 //! | `training` | the whole of a training, from the folder of a dataset to the trained capture |
 //! | `once` | the same as the first stage of a bake: a finished training is not repeated |
@@ -22,6 +23,7 @@ mod once;
 mod point;
 mod region;
 mod start;
+mod surroundings;
 mod training;
 mod writer;
 

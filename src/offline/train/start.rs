@@ -1,7 +1,7 @@
 //! The Gaussians before the first step.
 //!
 //! In: training images, [`StartSettings`]. Out: a scene of native 4D Gaussians at points of the visual hull, or at random ones in the box
-//! that the cameras look at.
+//! that the cameras look at; an environment map behind them if the images cover all of their pixels.
 //!
 //! Opacity is 0.1; the spatial scale is the root of the mean squared distance to the three nearest points; the temporal scale is a share of
 //! the interval; no Gaussian is rotated or moves (section 5.4 of the 4DGS model).
@@ -10,6 +10,7 @@ use super::error::StartError;
 use super::hull::hull;
 use super::point::StartPoint;
 use super::region::Region;
+use super::surroundings::surroundings;
 use crate::gaussian::harmonics::evaluated;
 use crate::gaussian::{Harmonics, Parameters};
 use crate::offline::dataset::CoveredImage;
@@ -34,6 +35,8 @@ const SH_C0: f32 = 0.282_094_79;
 const OUTSIDE: f32 = 0.1;
 /// Color of random points, the original's.
 const GRAY: f32 = 127.0 / 255.0;
+/// Rows of the environment map, unless asked for others.
+const ROWS: u32 = 128;
 /// Distance of points that fill a hull of too few, as a share of the half side of the box.
 const FILLING: f32 = 0.02;
 
@@ -75,18 +78,30 @@ pub struct StartSettings {
     pub degree: u32,
     /// Degree of color in time, 0 to 2; used only if `degree` is 3.
     pub degree_t: u32,
+    /// Rows of the environment map behind the Gaussians, which has twice as many columns; 0: no map; `None`: 128 if every image covers all of
+    /// its pixels, else no map.
+    pub environment: Option<u32>,
 }
 
 impl Default for StartSettings {
     fn default() -> Self {
-        Self { gaussians: 60_000, start: Start::Auto, time_scale: None, seed: 0, degree: 3, degree_t: 2 }
+        Self {
+            gaussians: 60_000,
+            start: Start::Auto,
+            time_scale: None,
+            seed: 0,
+            degree: 3,
+            degree_t: 2,
+            environment: None,
+        }
     }
 }
 
 /// Returns the scene before the first step, and where its points come from: the hull, or random places.
 ///
 /// # Errors
-/// Cameras without a common region; a visual hull that was asked for and is empty.
+/// Cameras without a common region; a visual hull that was asked for and is empty; an environment map that was asked for and that images with
+/// transparent pixels do not show.
 pub fn begin(
     images: &TrainingImages,
     trained_with: TrainedWith,
@@ -94,6 +109,11 @@ pub fn begin(
     settings: &StartSettings,
 ) -> Result<(GaussianScene, Start), StartError> {
     let pairs: Vec<(&View, &CoveredImage)> = images.pairs().collect();
+    let has_gaps = pairs.iter().any(|(_, image)| image.has_gaps);
+    let rows = settings.environment.unwrap_or(if has_gaps { 0 } else { ROWS });
+    if rows > 0 && has_gaps {
+        return Err(StartError::NoSurroundings);
+    }
     let region = Region::of(pairs.iter().map(|(view, _)| *view))?;
     let (points, start) = points(&pairs, &region, trained_with.time_interval, settings)?;
     let span = trained_with.time_span();
@@ -102,7 +122,7 @@ pub fn begin(
     let (degree, degree_t) = (settings.degree.min(3), if settings.degree >= 3 { settings.degree_t.min(2) } else { 0 });
     let scene = GaussianScene {
         form: SceneForm::Trained(trained(&points, scale_t, degree, degree_t)),
-        environment: None,
+        environment: (rows > 0).then(|| surroundings(&pairs, rows)),
         filter: None,
         trained_with,
         playback,

@@ -1,11 +1,11 @@
 //! Captures as Bevy assets.
 //!
-//! In: the bytes of a `.gs4d` package or a `.pth` checkpoint, from any Bevy asset source. Out: a [`GaussianCapture`], decoded on
+//! In: the bytes of a `.gs4d` package, a `.pth` checkpoint or a capture of another make, from any Bevy asset source. Out: a [`GaussianCapture`], decoded on
 //! the asset task pool and shared by any number of entities; on each entity a [`CaptureState`], and messages when it changes.
 //!
 //! ```text
 //! file ──▶ PackageLoader, CheckpointLoader ──▶ GaussianCapture ──▶ PackageSaver ──▶ file
-//!                      │                              │
+//!          ImportLoader│                              │
 //!                      │ fails                        │ is loaded, or loaded again
 //!                      ▼                 fails        ▼
 //!                CaptureFailed ◀─────────────── upload to the GPU
@@ -28,7 +28,7 @@ mod systems;
 mod uploads;
 
 pub use super::component::{GaussianCapture, KeyFrames};
-pub use loader::{CaptureLoadError, CheckpointLoader, PackageLoader, PackageLoaderSettings};
+pub use loader::{CaptureLoadError, CheckpointLoader, ImportLoader, PackageLoader, PackageLoaderSettings};
 pub(crate) use messages::send;
 pub use messages::{CaptureFailed, CaptureReady};
 pub(crate) use plugin::CaptureAssetPlugin;

@@ -2,7 +2,7 @@
 //!
 //! In: an app with Bevy's `AssetPlugin`. Out: the same app, in which captures load and every entity with one has a [`CaptureState`].
 
-use super::loader::{CheckpointLoader, PackageLoader};
+use super::loader::{CheckpointLoader, ImportLoader, PackageLoader};
 use super::messages::{CaptureFailed, CaptureReady};
 use super::state::{CaptureAssetSystems, CaptureState};
 use super::systems::{any_upload_failure, report_upload_failures, update_states};
@@ -25,6 +25,7 @@ impl Plugin for CaptureAssetPlugin {
             .register_required_components::<GaussianCapture3d, CaptureState>()
             .init_asset_loader::<PackageLoader>()
             .init_asset_loader::<CheckpointLoader>()
+            .init_asset_loader::<ImportLoader>()
             .add_message::<CaptureReady>()
             .add_message::<CaptureFailed>()
             .configure_sets(PreUpdate, CaptureAssetSystems.after(AssetTrackingSystems))

@@ -55,7 +55,13 @@ impl GaussianCapture {
         let shown = [0.0, f32::INFINITY].map(|seconds| capture.time_at(seconds));
         let mut extents = Extents::of(capture.scene.len());
         let gaussians = capture.scene.iter().inspect(|gaussian| extents.add(gaussian));
-        capture.bounds = BoundsOverTime::of(gaussians, shown).map(Arc::new);
+        capture.bounds = BoundsOverTime::of(
+            gaussians,
+            shown,
+            capture.scene.trained_with.marginal_cutoff,
+            capture.scene.filter.as_ref(),
+        )
+        .map(Arc::new);
         capture.extent = extents.upper_quartile();
         capture
     }

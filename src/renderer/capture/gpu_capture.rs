@@ -163,6 +163,7 @@ impl GpuCapture {
             first_entries: form.coded_colors().map(first_entries).unwrap_or_default(),
             displaced: u32::from(scene.trained_with.sh_direction == ShDirection::Displaced),
             time_span: scene.trained_with.time_span(),
+            marginal_cutoff: scene.trained_with.marginal_cutoff,
             ..bytemuck::Zeroable::zeroed()
         };
         let id = NEXT_ID.fetch_add(1, Ordering::Relaxed);
@@ -252,6 +253,12 @@ impl GpuCapture {
         }
     }
 
+    /// Returns the buffer of the texels of the environment map, planar, for passes of clients that write them. Returns `None` if the capture
+    /// has no map.
+    pub fn environment(&self) -> Option<&wgpu::Buffer> {
+        self.environment.as_ref().map(|map| &map.buffer)
+    }
+
     /// Returns the bind group of the geometry, for passes of clients. Returns `None` if the capture has several parts.
     pub fn geometry(&self) -> Option<&wgpu::BindGroup> {
         if let [part] = &self.parts[..] { Some(&part.geometry) } else { None }
@@ -267,6 +274,7 @@ impl GpuCapture {
             stages: self.settings.stages,
             first_entries: self.settings.first_entries,
             time_span: self.settings.time_span,
+            marginal_cutoff: self.settings.marginal_cutoff,
             ..*view
         }
     }

@@ -88,7 +88,7 @@ fn scenes() -> Vec<GaussianScene> {
     let sliced = packed_scene::scene(40, 0, 0);
     // Forty segments are smaller as intervals.
     let mut interval = packed_scene::scene(40, 1, 0);
-    let support = TemporalFilter::support(interval.iter(), interval.trained_with.time_interval, 40);
+    let support = TemporalFilter::support(interval.iter(), interval.trained_with.time_interval, 0.05, 40);
     interval.filter = Some(support);
     let pack = |degree, degree_t, codebooks: &[usize]| {
         let scene = packed_scene::scene(40, degree, degree_t);

@@ -9,6 +9,8 @@ mod archive;
 mod attributes;
 mod codebook;
 mod palette;
+#[cfg(test)]
+mod refusals;
 mod rotation;
 #[cfg(test)]
 mod round_trip;

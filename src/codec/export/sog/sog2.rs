@@ -4,7 +4,8 @@
 
 use super::archive::{self, Entry};
 use super::attributes::{Attributes, encode};
-use crate::codec::export::table::Clip;
+use crate::codec::export::clip::Clip;
+use crate::codec::export::y_up::y_down;
 use crate::codec::import::columns::Columns;
 use serde_json::json;
 use std::io::{self, Write};
@@ -13,7 +14,8 @@ use std::io::{self, Write};
 ///
 /// # Errors
 /// Errors of the writer; more Gaussians than a picture has pixels.
-pub(in crate::codec::export) fn write(columns: &Columns, _: &Clip, writer: &mut dyn Write) -> io::Result<()> {
+pub(in crate::codec::export) fn write(columns: &Columns, clip: &Clip, writer: &mut dyn Write) -> io::Result<()> {
+    let columns = &*y_down(columns, clip.up)?;
     let means: Vec<[f64; 3]> = columns.mean.iter().map(|mean| mean.map(f64::from)).collect();
     let attributes = Attributes::of(columns, &means);
     let places = attributes.places();

@@ -10,7 +10,8 @@ use super::attributes::{Attributes, Texels, encode};
 use super::codebook::Codebook;
 use super::segments::{REACH, SPAN, Segments};
 use super::wide::Wide;
-use crate::codec::export::table::Clip;
+use crate::codec::export::clip::Clip;
+use crate::codec::export::y_up::y_down;
 use crate::codec::import::columns::{Columns, Motion};
 use crate::gaussian::Lifespan;
 use rayon::prelude::*;
@@ -47,6 +48,7 @@ struct Moving {
 /// # Errors
 /// Errors of the writer; more Gaussians than a picture has pixels.
 pub(in crate::codec::export) fn write(columns: &Columns, clip: &Clip, writer: &mut dyn Write) -> io::Result<()> {
+    let columns = &*y_down(columns, clip.up)?;
     let clock = Clock::of(clip);
     let moving = Moving::of(columns, clock);
     let attributes = Attributes::of(columns, &moving.means);

@@ -111,7 +111,9 @@ fn ascii_rows<'a>(
         })
     };
     let mut list = Vec::new();
-    for _ in 0..if element.properties.is_empty() { 0 } else { element.count } {
+    // An element without properties has no words, whatever its number of rows.
+    let count = if element.properties.is_empty() { 0 } else { element.count };
+    for _ in 0..count {
         for property in &element.properties {
             match property.kind {
                 Kind::One(scalar) => number(scalar, if stride.is_some() { &mut rows } else { &mut list })?,

@@ -29,10 +29,11 @@ pub(super) fn columns(tables: &[Table<'_>], vertex: &Table<'_>) -> Result<Column
     let scale_low = chunk.all(["min_scale_x", "min_scale_y", "min_scale_z"])?;
     let scale_high = chunk.all(["max_scale_x", "max_scale_y", "max_scale_z"])?;
     // Files before the boxes of colors have colors from 0 to 1.
-    let colors = chunk
-        .has("min_r")
-        .then(|| Ok((chunk.all(["min_r", "min_g", "min_b"])?, chunk.all(["max_r", "max_g", "max_b"])?)));
-    let colors = colors.transpose().map_err(|error: ImportError| error)?;
+    let colors = if chunk.has("min_r") {
+        Some((chunk.all(["min_r", "min_g", "min_b"])?, chunk.all(["max_r", "max_g", "max_b"])?))
+    } else {
+        None
+    };
     let [position, rotation, scale, color] =
         vertex.all(["packed_position", "packed_rotation", "packed_scale", "packed_color"])?;
 

@@ -6,7 +6,6 @@ use super::read;
 use crate::codec::import::source::{InMemory, Source};
 use crate::codec::import::{ImportError, Imported};
 use crate::codec::options::ReadOptions;
-use std::path::Path;
 
 /// A file with one element.
 #[derive(Debug, Clone, Default)]
@@ -92,7 +91,7 @@ impl File {
 
 /// Reads a file from memory.
 pub(crate) fn read_bytes(bytes: &[u8], options: &ReadOptions) -> Result<Imported, ImportError> {
-    read(&Source { path: Path::new("test.ply"), bytes, beside: &InMemory::default() }, options)
+    read(&Source { bytes, beside: &InMemory::default() }, options)
 }
 
 /// Returns the message about a file that is refused.

@@ -38,7 +38,10 @@ pub(super) fn free_time(
     let moves = !comments.value("use_velocity").is_some_and(|used| used == "0" || used.eq_ignore_ascii_case("false"));
     let shortest = comments.number("min_duration")?.unwrap_or(0.0);
     if let Some(floor) = comments.number("opacity_floor")?.filter(|&floor| floor > 0.0) {
-        lost.push(format!("Players of FreeTimeGS show every Gaussian at all times with at least {floor} of its opacity; here it is drawn in its lifespan alone."));
+        lost.push(format!(
+            "Players of FreeTimeGS show every Gaussian at all times with at least {floor} of its opacity; here it is drawn in its \
+             lifespan alone."
+        ));
     }
     let frames = comments.number("n_frames")?.filter(|&frames| frames >= 1.0);
     let played = Played {

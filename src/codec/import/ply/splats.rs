@@ -32,7 +32,9 @@ pub(super) fn columns(table: &Table<'_>, comments: &Comments, lost: &mut Vec<Str
     }
     if is_antialiased(comments) {
         lost.push(
-            "It was trained with an anti-aliasing filter (Mip-Splatting), which is not drawn: small Gaussians look larger, by up to a pixel.".to_owned(),
+            "It was trained with an anti-aliasing filter (Mip-Splatting), which is not drawn: small Gaussians look larger, by up to \
+             a pixel."
+                .to_owned(),
         );
     }
     Ok(columns)

@@ -356,8 +356,7 @@ fn spacetime_gaussians_follow_their_cubic_paths_and_have_plain_colors() {
 
 #[test]
 fn an_acceleration_bends_the_paths_of_sogst() {
-    let mut file =
-        File::splats(1, 9).comment("sogst.time_min 2").comment("sogst.time_max 4").with("t_center", |_| 3.0);
+    let mut file = File::splats(1, 9).comment("sogst.time_min 2").comment("sogst.time_max 4").with("t_center", |_| 3.0);
     file = file.with("t_sigma", |_| 50.0);
     for (name, value) in [("vx", 1.0), ("vy", 0.0), ("vz", 0.5), ("ax", 0.0), ("ay", -9.0), ("az", 0.0)] {
         file = file.with(name, |_| value);

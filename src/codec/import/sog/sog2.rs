@@ -28,9 +28,9 @@ struct Drawn {
 #[derive(Debug, Clone, Deserialize)]
 struct First {
     means: FirstMeans,
-    scales: Narrow<3>,
+    scales: Narrow<[f64; 3]>,
     quats: Single,
-    sh0: Narrow<4>,
+    sh0: Narrow<[f64; 4]>,
     #[serde(rename = "shN")]
     rest: Option<FirstRest>,
 }
@@ -45,11 +45,9 @@ struct FirstMeans {
 
 /// Numbers of 8 bits, linear between limits for each channel.
 #[derive(Debug, Clone, Deserialize)]
-struct Narrow<const CHANNELS: usize> {
-    #[serde(with = "limits")]
-    mins: [f64; CHANNELS],
-    #[serde(with = "limits")]
-    maxs: [f64; CHANNELS],
+struct Narrow<Limits> {
+    mins: Limits,
+    maxs: Limits,
     files: [String; 1],
 }
 
@@ -59,17 +57,6 @@ struct FirstRest {
     mins: f64,
     maxs: f64,
     files: [String; 2],
-}
-
-/// Arrays of any length, for which serde has no implementation.
-mod limits {
-    use serde::{Deserialize, Deserializer, de};
-
-    pub(super) fn deserialize<'de, D: Deserializer<'de>, const N: usize>(from: D) -> Result<[f64; N], D::Error> {
-        let values = Vec::<f64>::deserialize(from)?;
-        let length = values.len();
-        values.try_into().map_err(|_| de::Error::invalid_length(length, &"a limit for each channel"))
-    }
 }
 
 /// Gaussians at rest and what the scene does not show of them.
@@ -122,8 +109,8 @@ pub(super) fn columns(files: &mut Files, meta: &Value, ranges: Option<&[Range<us
     let encoded = textures::read(files, layout.names())?;
     let count = textures::check_count(count, &encoded)?;
     let textures = textures::decode(&encoded, count)?;
-    let whole = [0..count];
-    let ranges = ranges.unwrap_or(&whole);
+    let whole = 0..count;
+    let ranges = ranges.unwrap_or(std::slice::from_ref(&whole));
     let wanted: usize = ranges.iter().map(Range::len).sum();
     if wanted > count || ranges.iter().any(|range| range.end > count) {
         return Err(ImportError::damaged(format!("it has {count} Gaussians, fewer than lod-meta.json states")));

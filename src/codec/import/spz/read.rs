@@ -316,7 +316,7 @@ mod tests {
     fn up_is_y_unless_an_option_says_otherwise() {
         let bytes = file(4, 1, 1, None);
         let beside = InMemory::default();
-        let source = Source { path: Path::new("a.spz"), bytes: &bytes, beside: &beside };
+        let source = Source { bytes: &bytes, beside: &beside };
         for (up, expected) in [(None, UpAxis::PosY), (Some(UpAxis::NegY), UpAxis::NegY)] {
             let scene = read(&source, &ReadOptions { up, ..ReadOptions::default() }).expect("a file").scene;
             assert_eq!(scene.playback.up, expected, "the axis that points up");

@@ -1,0 +1,128 @@
+//! Captures of other makes as assets in Bevy apps.
+//!
+//! In: files of every format that is exported, and files of other makes. Out: proof that `assets.load` shows what `codec::load` reads, with the
+//! settings given; that other files of a folder are found; that failures have a message. Needs neither a GPU nor a window.
+
+use crate::support::data::data;
+use crate::support::waiting::wait_until;
+use bevy::prelude::*;
+use bevy_gs4d::asset::{CaptureState, GaussianCapture};
+use bevy_gs4d::codec::{self, ReadOptions};
+use bevy_gs4d::internal::codec::export::{EXPORTS, Export, Exporter};
+use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use bevy_gs4d::scene::{FilterKind, RuntimeScene, UpAxis};
+use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin};
+use std::fs;
+use std::path::Path;
+
+/// Returns an app whose assets are in `folder`.
+fn app(folder: &Path) -> App {
+    let file_path = folder.to_str().expect("temporary folders have plain names").into();
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, AssetPlugin { file_path, ..default() }, GaussianCapturePlugin));
+    app
+}
+
+/// Loads a capture with these settings and waits until it is ready or has failed.
+fn loaded(app: &mut App, name: &str, options: &ReadOptions) -> (Handle<GaussianCapture>, CaptureState) {
+    let options = options.clone();
+    let settings = move |own: &mut ReadOptions| own.clone_from(&options);
+    let capture = app.world().resource::<AssetServer>().load_builder().with_settings(settings).load(name.to_owned());
+    let entity = app.world_mut().spawn(GaussianCapture3d(capture.clone())).id();
+    let state = |app: &App| app.world().get::<CaptureState>(entity).expect("every capture has a state").clone();
+    wait_until(app, name, |app| state(app) != CaptureState::Loading, App::update);
+    (capture, state(app))
+}
+
+fn scene<'a>(app: &'a App, capture: &Handle<GaussianCapture>) -> &'a RuntimeScene {
+    app.world().resource::<Assets<GaussianCapture>>().get(capture).expect("it is loaded").scene()
+}
+
+/// Writes a file of the format for each time, and returns the name of each.
+fn export(folder: &Path, id: &str, times: &[f32]) -> Vec<String> {
+    let synthetic = synthesize(&SynthSettings { count: 60, ..SynthSettings::default() });
+    let format = Export::of_id(id).expect("a format");
+    let exporter = Exporter::new(synthetic, format, 30.0).expect("the scene can be exported");
+    let name = |frame: usize| format!("{id}_{frame:02}.{}", format.extension);
+    for (frame, time) in times.iter().enumerate() {
+        let mut bytes = Vec::new();
+        exporter.write(*time, &mut bytes).expect("memory can be written to");
+        fs::write(folder.join(name(frame)), bytes).expect("the folder can be written to");
+    }
+    (0..times.len()).map(name).collect()
+}
+
+#[test]
+fn every_exported_format_that_is_read_loads_as_an_asset() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mut app = app(folder.path());
+    let options = ReadOptions { up: Some(UpAxis::PosX), marginal_cutoff: Some(0.25), ..ReadOptions::default() };
+    let mut tried = Vec::new();
+    for format in EXPORTS {
+        let name = export(folder.path(), format.id, &[0.4]).remove(0);
+        let Ok(expected) = codec::load(&folder.path().join(&name), &options) else { continue };
+        let (capture, state) = loaded(&mut app, &name, &options);
+        assert_eq!(state, CaptureState::Ready, "{name} is loaded");
+        let found = scene(&app, &capture);
+        assert_eq!(*found, expected.into_runtime().expect("it can be drawn"), "{name}: the scene of the file");
+        assert_eq!(
+            (found.playback.up, found.trained_with.marginal_cutoff),
+            (UpAxis::PosX, 0.25),
+            "{name}: the settings"
+        );
+        tried.push(format.id);
+    }
+    assert!(tried.contains(&"ply") && tried.len() > 3, "several formats are written and read: {tried:?}");
+}
+
+#[test]
+fn the_contents_of_a_file_decide_its_format() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let name = export(folder.path(), "ply", &[0.5]).remove(0);
+    fs::rename(folder.path().join(name), folder.path().join("scan.capture")).expect("the folder can be written to");
+    let mut app = app(folder.path());
+    let (capture, state) = loaded(&mut app, "scan.capture", &ReadOptions::default());
+    assert_eq!(state, CaptureState::Ready, "it is loaded");
+    assert!(!scene(&app, &capture).is_empty(), "the PLY is read in spite of its name");
+}
+
+#[test]
+fn numbered_files_load_as_a_sequence() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let names = export(folder.path(), "ply", &[0.2, 0.5, 0.8]);
+    let mut app = app(folder.path());
+    let options = ReadOptions { sequence: true, fps: Some(2.0), ..ReadOptions::default() };
+    let (capture, state) = loaded(&mut app, &names[0], &options);
+    assert_eq!(state, CaptureState::Ready, "it is loaded");
+    let found = scene(&app, &capture);
+    let filter = found.filter.as_ref().expect("each frame has a window");
+    assert_eq!((filter.kind, filter.segments), (FilterKind::Window, 3), "three frames");
+    assert_eq!(found.playback.duration_seconds, 1.5, "at two frames a second");
+    let expected = codec::load(folder.path(), &options).expect("the folder is a sequence");
+    assert_eq!(*found, expected.into_runtime().expect("it can be drawn"), "the same as the folder");
+}
+
+#[test]
+fn files_that_a_capture_names_are_found_beside_it() {
+    let Some(data) = data() else { return };
+    let folder = data.join("formats/playcanvas/playbot/6_0");
+    let mut app = app(&folder);
+    let (capture, state) = loaded(&mut app, "meta.json", &ReadOptions::default());
+    assert_eq!(state, CaptureState::Ready, "it is loaded");
+    let expected = codec::load(&folder.join("meta.json"), &ReadOptions::default()).expect("a readable SOG");
+    assert_eq!(*scene(&app, &capture), expected.into_runtime().expect("it can be drawn"), "the scene of the folder");
+}
+
+#[test]
+fn a_file_that_is_no_capture_fails_with_the_reason() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let points = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n0 0 0\n";
+    fs::write(folder.path().join("points.ply"), points).expect("the folder can be written to");
+    fs::write(folder.path().join("text.spz"), "no capture").expect("the folder can be written to");
+    let mut app = app(folder.path());
+    for (name, part) in [("points.ply", "points"), ("text.spz", "neither")] {
+        let (_, state) = loaded(&mut app, name, &ReadOptions::default());
+        let CaptureState::Failed(message) = state else { panic!("{name} is no capture") };
+        assert!(message.contains(name) && message.contains(part), "the message says why: {message}");
+    }
+}
