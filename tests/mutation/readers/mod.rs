@@ -56,7 +56,7 @@ pub struct Kind {
 }
 
 /// The readers.
-pub static KINDS: [Kind; 21] = [
+pub static KINDS: [Kind; 23] = [
     Kind {
         name: "package",
         about: "packages (.gs4d) in every form, with filters and environment maps",
@@ -203,5 +203,19 @@ pub static KINDS: [Kind; 21] = [
         extension: "sog",
         share: 1,
         make: || Arc::new(imports::Imports::new("sog")),
+    },
+    Kind {
+        name: "spz",
+        about: "SPZ files",
+        extension: "spz",
+        share: 1,
+        make: || Arc::new(imports::Imports::new("spz")),
+    },
+    Kind {
+        name: "glb",
+        about: "glTF files with KHR_gaussian_splatting, in one file",
+        extension: "glb",
+        share: 1,
+        make: || Arc::new(imports::Imports::new("glb")),
     },
 ];
