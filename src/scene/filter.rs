@@ -243,6 +243,14 @@ impl TemporalFilter {
         bits
     }
 
+    /// Returns the intervals of all Gaussians; `None` if the active segments of one are not contiguous.
+    pub(crate) fn to_intervals(&self) -> Option<Vec<u32>> {
+        match &self.sets {
+            ActiveSets::Intervals(intervals) => Some(intervals.clone()),
+            ActiveSets::Bits(_) => self.intervals(),
+        }
+    }
+
     /// Returns the sets as intervals; `None` if the active segments of a Gaussian are not contiguous.
     fn intervals(&self) -> Option<Vec<u32>> {
         (0..self.count)

@@ -4,7 +4,7 @@
 
 use crate::codec::export::table::Clip;
 use crate::codec::import::columns::{Columns, SH_C0};
-use crate::scene::ActiveSets;
+use crate::scene::FilterKind;
 use fourdgs::quantization::{Profile, sh_coefficient};
 use fourdgs::{GaussianSet, SceneExtras, WriteOptions, write_to_vec};
 use std::io::{self, Write};
@@ -62,10 +62,13 @@ pub(crate) fn write(columns: &Columns, clip: &Clip, writer: &mut dyn Write) -> i
 
 /// Returns when each Gaussian exists, seconds; nothing if all exist always.
 fn windows(columns: &Columns, duration: f32) -> io::Result<Vec<[f32; 2]>> {
-    let Some(filter) = &columns.filter else { return Ok(Vec::new()) };
-    let ActiveSets::Intervals(intervals) = &filter.sets else {
-        return Err(io::Error::other("its temporal filter has Gaussians that are active in separate segments of time"));
+    // A filter of lifespans shows nothing that they do not show.
+    let Some(filter) = columns.filter.as_ref().filter(|filter| filter.kind != FilterKind::Support) else {
+        return Ok(Vec::new());
     };
+    let intervals = filter.to_intervals().ok_or_else(|| {
+        io::Error::other("its temporal filter has Gaussians that are active in separate segments of time")
+    })?;
     let time = |segment: u32| duration * segment as f32 / filter.segments as f32;
     let window = |&word: &u32| {
         let (first, last) = (word & 0xffff, word >> 16);
@@ -92,7 +95,7 @@ mod tests {
     use crate::codec::import::columns::{Motion, logit};
     use crate::codec::import::source::{InMemory, Source};
     use crate::codec::options::ReadOptions;
-    use crate::scene::{FilterKind, Form, SceneForm, TemporalFilter, UpAxis};
+    use crate::scene::{ActiveSets, Form, SceneForm, TemporalFilter, UpAxis};
 
     #[test]
     fn a_written_file_is_read_as_the_same_gaussians() {

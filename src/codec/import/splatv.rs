@@ -72,7 +72,9 @@ fn push(record: &[u8; RECORD], columns: &mut Columns, bends: &mut Vec<Bend>) {
     let three = |index: usize| [0, 1, 2].map(|lane| half(index + lane));
     let four = |index: usize| [0, 1, 2, 3].map(|lane| half(index + lane));
     columns.mean.push([0, 1, 2].map(|lane| f32::from_le_bytes(floats[lane])));
-    columns.rotation.push(four(6));
+    // The player's matrix of a quaternion of length 0 is the identity, and its files have many of them.
+    let rotation = four(6);
+    columns.rotation.push(if rotation == [0.0; 4] { [1.0, 0.0, 0.0, 0.0] } else { rotation });
     columns.log_scale.push(three(10).map(f32::ln));
     columns.opacity_logit.push(logit(alpha));
     columns.harmonics.values.extend([red, green, blue].map(coefficient));
@@ -180,6 +182,15 @@ mod tests {
         let found = read_file(&file(PARTS, &data), &ReadOptions::default()).expect("a whole file");
         assert_eq!(found.scene.len(), 1, "a splat whose motion is not finite is left out");
         assert!(found.lost.iter().any(|lost| lost.starts_with("1 of 2 Gaussians")), "and stated: {:?}", found.lost);
+    }
+
+    #[test]
+    fn a_quaternion_of_length_0_is_no_rotation() {
+        let mut data = record(STRAIGHT, 0.0, 0.5);
+        data[12..20].fill(0);
+        let found = read_file(&file(PARTS, &data), &ReadOptions::default()).expect("a whole file");
+        let covariance = gaussians(&found.scene)[0].covariance;
+        assert!((covariance[0].sqrt() - 0.1).abs() < 1e-3 && covariance[1] == 0.0, "axes of space: {covariance:?}");
     }
 
     #[test]

@@ -137,6 +137,7 @@ fn exports(extension: &str) -> &'static [&'static str] {
         "4dgs" => &["4dgs"],
         "sog" => &["sog", "sogst"],
         "spz" => &["spz"],
+        "glb" => &["gltf"],
         _ => &[],
     }
 }

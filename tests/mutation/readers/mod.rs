@@ -57,7 +57,7 @@ pub struct Kind {
 }
 
 /// The readers.
-pub static KINDS: [Kind; 22] = [
+pub static KINDS: [Kind; 24] = [
     Kind {
         name: "package",
         about: "packages (.gs4d) in every form, with filters and environment maps",
@@ -211,5 +211,19 @@ pub static KINDS: [Kind; 22] = [
         extension: "gs4p",
         share: 2,
         make: || Arc::new(parts::Parts::new()),
+    },
+    Kind {
+        name: "spz",
+        about: "SPZ files",
+        extension: "spz",
+        share: 1,
+        make: || Arc::new(imports::Imports::new("spz")),
+    },
+    Kind {
+        name: "glb",
+        about: "glTF files with KHR_gaussian_splatting, in one file",
+        extension: "glb",
+        share: 1,
+        make: || Arc::new(imports::Imports::new("glb")),
     },
 ];

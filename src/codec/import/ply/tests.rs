@@ -6,6 +6,7 @@ use crate::codec::import::columns::{SH_C0, logit};
 use crate::codec::options::ReadOptions;
 use crate::gaussian::{Gaussian, Harmonics, Model, Parameters, SMALLEST_CUTOFF};
 use crate::scene::{Form, RotationConvention, SceneForm, Trained, UpAxis};
+use glam::Vec3;
 
 fn read(bytes: &[u8]) -> Imported {
     read_bytes(bytes, &ReadOptions::default()).unwrap_or_else(|error| panic!("the file can be read: {error}"))
@@ -313,4 +314,58 @@ fn gaussians_that_are_not_finite_are_left_out() {
     assert!(imported.lost[0].starts_with("1 of 3"), "they are counted: {:?}", imported.lost);
     assert_eq!(imported.scene.len(), 2, "the others are kept");
     assert_eq!(read(&File::splats(0, 0).little()).scene.len(), 0, "a file without Gaussians");
+}
+
+/// Reads a file and returns the active mean of its only path at some times, and the red coefficient.
+fn path(bytes: &[u8], interval: [f32; 2]) -> (Vec<(f32, Vec3)>, f32) {
+    let found = read(bytes);
+    let SceneForm::Ready(Form::Sliced(sliced)) = &found.scene.form else { panic!("moving Gaussians are sliced") };
+    let filter = found.scene.filter.as_ref().expect("pieces have a filter");
+    let at = |step: u32| {
+        let time = interval[0] + (interval[1] - interval[0]) * step as f32 / 20.0;
+        let segment = filter.segment_of(time, interval);
+        let active: Vec<usize> =
+            (0..sliced.gaussians.len()).filter(|&index| filter.is_active(segment, index)).collect();
+        let [index] = active[..] else { panic!("one piece at {time}: {active:?}") };
+        (time, sliced.gaussians[index].mean_at(time))
+    };
+    ((0..=20).map(at).collect(), sliced.harmonics.values[0])
+}
+
+#[test]
+fn spacetime_gaussians_follow_their_cubic_paths_and_have_plain_colors() {
+    let mut file = File::splats(1, 0).with("trbf_center", |_| 0.25).with("trbf_scale", |_| 3.0);
+    let factors: Vec<f32> = (0..9).map(|number| (number as f32 - 3.0) * 0.7).collect();
+    for (number, &factor) in factors.iter().enumerate() {
+        file = file.with(&format!("motion_{number}"), |_| factor);
+    }
+    for number in 0..4 {
+        file = file.with(&format!("omega_{number}"), |_| 0.1);
+    }
+    let mean = Vec3::new(file.value("x", 0), file.value("y", 0), file.value("z", 0));
+    let (found, red) = path(&file.little(), [0.0, 1.0]);
+    let largest = (0..3).map(|axis| file.value(&format!("scale_{axis}"), 0).exp()).fold(0.0, f32::max);
+    for (time, at) in found {
+        let d = time - 0.25;
+        let power = |first: usize| Vec3::from_slice(&factors[first..]);
+        let expected = mean + power(0) * d + power(3) * d * d + power(6) * d * d * d;
+        assert!(at.distance(expected) < 0.25 * largest + 1e-3, "at {time}: {at} is {expected}");
+    }
+    assert_eq!(red, (file.value("f_dc_0", 0) - 0.5) / SH_C0, "f_dc is the color itself");
+}
+
+#[test]
+fn an_acceleration_bends_the_paths_of_sogst() {
+    let mut file = File::splats(1, 9).comment("sogst.time_min 2").comment("sogst.time_max 4").with("t_center", |_| 3.0);
+    file = file.with("t_sigma", |_| 50.0);
+    for (name, value) in [("vx", 1.0), ("vy", 0.0), ("vz", 0.5), ("ax", 0.0), ("ay", -9.0), ("az", 0.0)] {
+        file = file.with(name, |_| value);
+    }
+    let mean = Vec3::new(file.value("x", 0), file.value("y", 0), file.value("z", 0));
+    let largest = (0..3).map(|axis| file.value(&format!("scale_{axis}"), 0).exp()).fold(0.0, f32::max);
+    for (time, at) in path(&file.little(), [2.0, 4.0]).0 {
+        let d = time - 3.0;
+        let expected = mean + Vec3::new(d, -9.0 * d * d, 0.5 * d);
+        assert!(at.distance(expected) < 0.25 * largest + 1e-3, "at {time}: {at} is {expected}");
+    }
 }
