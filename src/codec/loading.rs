@@ -5,7 +5,8 @@
 
 use super::error::{CodecError, CodecErrorKind};
 use super::format::{self, Format, Read};
-use super::import::source::InMemory;
+use super::import::source::{InMemory, Source};
+use super::import::{ImportError, Imported};
 use super::options::ReadOptions;
 use super::package::{self, PackageError, Reading};
 use super::start::Start;
@@ -38,9 +39,13 @@ pub struct Loading {
 
 enum State {
     Package(Box<Reading<Cursor<Vec<u8>>>>),
-    /// A file of another make, and its scene once it has been read.
-    Other(Vec<u8>, Option<GaussianScene>),
+    /// A file of another make, and how it is read.
+    Other(Vec<u8>, ReadBytes),
+    /// Its scene.
+    Read(Box<GaussianScene>),
 }
+
+type ReadBytes = fn(&Source<'_>, &ReadOptions) -> Result<Imported, ImportError>;
 
 impl Loading {
     /// Recognizes the format of a file by its contents, or by the extension of its name, and reads the header of a package.
@@ -60,13 +65,12 @@ impl Loading {
     pub fn advance(&mut self, bytes: usize) -> Result<bool, CodecError> {
         let mut advance = || match &mut self.state {
             State::Package(reading) => Ok(reading.advance(bytes)?),
-            State::Other(_, Some(_)) => Ok(false),
-            State::Other(bytes, scene) => {
-                let bytes = std::mem::take(bytes);
-                let beside = InMemory::default();
-                *scene = Some(super::read_bytes(&self.path, &bytes, &beside, &self.options)?.scene);
+            State::Other(bytes, read) => {
+                let source = Source { path: &self.path, bytes, beside: &InMemory::default() };
+                self.state = State::Read(Box::new(read(&source, &self.options)?.scene));
                 Ok(true)
             }
+            State::Read(_) => Ok(false),
         };
         advance().map_err(|kind| CodecError { path: self.path.clone(), kind })
     }
@@ -75,7 +79,8 @@ impl Loading {
     pub fn progress(&self) -> f32 {
         match &self.state {
             State::Package(reading) => reading.progress(),
-            State::Other(_, scene) => f32::from(u8::from(scene.is_some())),
+            State::Other(..) => 0.0,
+            State::Read(_) => 1.0,
         }
     }
 
@@ -87,7 +92,8 @@ impl Loading {
         while self.advance(usize::MAX)? {}
         let finish = || match self.state {
             State::Package(reading) => Ok(reading.finish_with(&self.options)?),
-            State::Other(_, scene) => scene.ok_or_else(|| CodecErrorKind::UnknownFormat(format::unknown())),
+            State::Read(scene) => Ok(*scene),
+            State::Other(..) => Err(CodecErrorKind::UnknownFormat(format::unknown())),
         };
         finish().map_err(|kind| CodecError { path: self.path, kind })
     }
@@ -100,8 +106,43 @@ impl State {
             return Ok(Self::Package(Box::new(Reading::new(Cursor::new(bytes))?)));
         }
         match Format::of(&Start::of(&mut Cursor::new(&bytes), path)?).map(|format| format.read) {
-            Some(Read::Bytes(_)) => Ok(Self::Other(bytes, None)),
+            Some(Read::Bytes(read)) => Ok(Self::Other(bytes, read)),
             Some(Read::File(_) | Read::Folder(_)) | None => Err(CodecErrorKind::UnknownFormat(format::unknown())),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BUNDLED: &[u8] = include_bytes!("../../assets/toybox.gs4d");
+
+    fn loading(bytes: &[u8]) -> Result<GaussianScene, CodecError> {
+        let mut loading = Loading::new("toybox.gs4d", bytes.to_vec(), &ReadOptions::default())?;
+        let mut before = 0.0;
+        while loading.advance(10_007)? {
+            assert!(loading.progress() >= before, "the progress does not go back");
+            before = loading.progress();
+        }
+        assert_eq!(loading.progress(), 1.0, "all has been read");
+        loading.finish()
+    }
+
+    #[test]
+    fn a_package_that_is_read_in_steps_is_the_package() {
+        let at_once = package::read(Cursor::new(BUNDLED)).expect("the bundled capture is intact");
+        assert!(loading(BUNDLED).expect("it is read in steps") == at_once, "every value is the same");
+    }
+
+    #[test]
+    fn a_damaged_file_is_refused_with_its_name() {
+        let mut damaged = BUNDLED.to_vec();
+        let last = damaged.len() - 1;
+        damaged[last] ^= 1;
+        for (bytes, expected) in [(&damaged[..], "checksum"), (&BUNDLED[..9_000], "cut off"), (b"other", "neither")] {
+            let message = loading(bytes).expect_err("it is refused").to_string();
+            assert!(message.starts_with("toybox.gs4d: ") && message.contains(expected), "{message}");
         }
     }
 }

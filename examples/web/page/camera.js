@@ -28,9 +28,11 @@ export class Orbit {
     Object.assign(this, { ...this.first, target: [...this.first.target], given: null });
   }
 
-  // A camera of the page around this one: a pose of sixteen numbers and a lens.
-  give(pose, lens) {
-    this.given = { pose, lens };
+  // Takes a camera of the page around this one: a pose of sixteen numbers, and perhaps a lens of two or four. Other values are ignored.
+  give({ pose, lens = null }) {
+    const are = (numbers, counts) => Array.isArray(numbers) && counts.includes(numbers.length) && numbers.every(Number.isFinite);
+    if (!are(pose, [16]) || (lens && !are(lens, [2, 4]))) return;
+    this.given = { pose: Float32Array.from(pose), lens: lens && Float32Array.from(lens) };
   }
 
   turn(yaw, pitch) {
@@ -86,7 +88,7 @@ export class Orbit {
   }
 
   read(text) {
-    const numbers = text.split(',').map(Number);
+    const numbers = String(text).split(',').map(Number);
     if (numbers.length !== 6 || !numbers.every(Number.isFinite)) return false;
     const [yaw, pitch, distance, ...target] = numbers;
     Object.assign(this, { yaw, target, given: null });

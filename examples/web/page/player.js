@@ -42,11 +42,16 @@ function say(text) {
   say.timer = setTimeout(() => (at('said').textContent = ''), 2500);
 }
 
-function refuse(text, again = null) {
+// Shows a message, with a button that closes it and does something, if there is anything to do.
+function refuse(text, label = '', action = null) {
   at('text').textContent = text;
   at('message').hidden = false;
-  at('again').hidden = !again;
-  at('again').onclick = again;
+  at('again').hidden = !label;
+  at('again').textContent = label;
+  at('again').onclick = () => {
+    at('message').hidden = true;
+    action?.();
+  };
   at('progress').hidden = true;
   tell('error', { message: text });
 }
@@ -108,7 +113,7 @@ function frame(now) {
   const fault = player.fault();
   if (fault) {
     play(false);
-    refuse(fault, () => location.reload());
+    refuse(fault, 'Load the page again', () => location.reload());
   }
   if (!player.is_ready()) return;
   if (pictured === 'drawn') {
@@ -127,7 +132,7 @@ function frame(now) {
     pictured ||= 'drawn';
   } catch (error) {
     play(false);
-    refuse(message(error), () => location.reload());
+    refuse(message(error), 'Load the page again', () => location.reload());
   }
 }
 
@@ -135,7 +140,7 @@ function frame(now) {
 function resize() {
   changed = true;
   if (player && !player.resize) return;
-  const density = Math.min(devicePixelRatio, DENSEST) * Number(query.get('scale') || 1);
+  const density = Math.min(devicePixelRatio, DENSEST) * Math.min(2, Math.max(0.1, Number(query.get('scale')) || 1));
   const size = [canvas.clientWidth, canvas.clientHeight].map((side) => Math.max(1, Math.round(side * density)));
   if (canvas.width === size[0] && canvas.height === size[1]) return;
   [canvas.width, canvas.height] = size;
@@ -187,7 +192,7 @@ async function openStream(name, stream, length, own, address = null) {
     }
     show(found, address);
   } catch (error) {
-    if (own === turn) refuse(`${name} was not opened: ${message(error)}`, about ? () => (at('message').hidden = true) : null);
+    if (own === turn) refuse(`${name} was not opened: ${message(error)}`, about ? 'Close' : '');
   }
 }
 
@@ -230,7 +235,7 @@ async function openAddress(address) {
     const length = response.headers.has('Content-Encoding') ? 0 : Number(response.headers.get('Content-Length')) || 0;
     await openStream(nameOf(address), response.body, length, own, address);
   } catch (error) {
-    if (own === turn) refuse(`${address} was not loaded: ${message(error)}`, () => openAddress(address));
+    if (own === turn) refuse(`${address} was not loaded: ${message(error)}`, 'Try again', () => openAddress(address));
   }
 }
 
@@ -247,6 +252,7 @@ async function openFile(file) {
 function link() {
   const address = new URL(location.href);
   address.search = '';
+  if (query.has('engine')) address.searchParams.set('engine', query.get('engine'));
   if (source) address.searchParams.set('capture', source);
   address.searchParams.set('time', seconds.toFixed(3));
   if (orbit) address.searchParams.set('camera', orbit.text());
@@ -313,7 +319,10 @@ function listen() {
   at('seek').oninput = () => seek(Number(at('seek').value) * duration());
   at('home').onclick = () => act('Home');
   at('open').onclick = () => at('file').click();
-  at('file').onchange = () => openFile(at('file').files[0]);
+  at('file').onchange = () => {
+    openFile(at('file').files[0]);
+    at('file').value = '';
+  };
   at('link').onclick = copyLink;
   at('full').onclick = full;
   addEventListener('keydown', (event) => {
@@ -364,7 +373,7 @@ function act(key) {
     o: () => at('file').click(),
     l: copyLink,
   };
-  const done = moves[key] ?? (/^[0-9]$/.test(key) ? () => seek((Number(key) / 10) * duration()) : null);
+  const done = Object.hasOwn(moves, key) ? moves[key] : /^[0-9]$/.test(key) ? () => seek((Number(key) / 10) * duration()) : null;
   done?.();
   changed ||= Boolean(done);
   return Boolean(done);
@@ -377,10 +386,13 @@ function obey(data) {
     pause: () => play(false),
     seek: () => seek(Number(data.value) || 0),
     speed: () => setSpeed(Number(data.value) || 1),
-    open: () => (typeof data.value === 'string' ? openAddress(data.value) : openBytes(data.name || 'capture', new Uint8Array(data.value))),
+    open: () => {
+      if (typeof data.value === 'string') openAddress(data.value);
+      else if (data.value instanceof ArrayBuffer) openBytes(String(data.name ?? 'capture'), new Uint8Array(data.value));
+    },
     camera: () => {
       if (typeof data.value === 'string') orbit?.read(data.value);
-      else orbit?.give(Float32Array.from(data.value.pose), data.value.lens && Float32Array.from(data.value.lens));
+      else orbit?.give(data.value ?? {});
       changed = true;
     },
   };
@@ -395,8 +407,8 @@ const WITHOUT =
 async function begin() {
   const poster = query.get('poster') ?? (query.has('capture') ? null : 'poster.jpg');
   if (poster) {
+    at('poster').onload = () => (at('poster').hidden = false);
     at('poster').src = poster;
-    at('poster').hidden = false;
   }
   stage.classList.toggle('bare', query.get('controls') === '0');
   progress(0);
@@ -416,7 +428,7 @@ async function begin() {
     const design = query.get('design') ?? (adapter.info?.isFallbackAdapter ? 'sort' : null);
     if (design) player.set_design?.(design);
   } catch (error) {
-    return refuse(`The player did not start: ${message(error)}`, () => location.reload());
+    return refuse(`The player did not start: ${message(error)}`, 'Load the page again', () => location.reload());
   }
   listen();
   requestAnimationFrame(frame);

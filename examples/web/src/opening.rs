@@ -49,7 +49,8 @@ impl Opening {
     /// # Errors
     /// A message about a file of an unknown format, or a damaged one.
     pub fn advance(&mut self) -> Result<Step, String> {
-        let message = |error: CodecError| error.to_string();
+        // The page names the file.
+        let message = |error: CodecError| error.kind.to_string();
         match std::mem::replace(&mut self.0, State::Empty) {
             State::Receiving(name, bytes) => {
                 let loading = Loading::new(&name, bytes, &ReadOptions::default());
