@@ -66,7 +66,7 @@ impl Loading {
         let mut advance = || match &mut self.state {
             State::Package(reading) => Ok(reading.advance(bytes)?),
             State::Other(bytes, read) => {
-                let source = Source { path: &self.path, bytes, beside: &InMemory::default() };
+                let source = Source { bytes, beside: &InMemory::default() };
                 self.state = State::Read(Box::new(read(&source, &self.options)?.scene));
                 Ok(true)
             }
