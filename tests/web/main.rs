@@ -10,6 +10,7 @@ mod shots;
 
 #[path = "../support"]
 mod support {
+    #[expect(dead_code, reason = "the player is compared with the CPU reference, not with the original's values")]
     pub mod golden;
     pub mod skip;
 }
