@@ -31,7 +31,7 @@ pub(super) fn strip(measure: &Measure, usual: Option<&Usual>, dots: &[Dot]) -> S
     let scaled = |value: f64| if measure.is_factor { value.ln() } else { value };
     let values = || dots.iter().map(|dot| dot.value);
     let [low, high] = [values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max)];
-    if !(low <= high) {
+    if low.partial_cmp(&high).is_none_or(|order| order.is_gt()) {
         return String::new();
     }
     let size = scaled(high) - scaled(low);
