@@ -66,9 +66,10 @@ impl Parts {
                     .arg("--data")
                     .arg(&data)
                     .args(["--engine", "cpu", "--shard", shard, "-o"]);
+                let of_mask = ["--filter", "interval", "--key-frames", &keys];
                 command.arg(&path).args(match verb {
                     "score" => &["--variant", "full"][..],
-                    "mask" => &["--filter", "interval", "--key-frames", &keys],
+                    "mask" => &of_mask,
                     _ => &[],
                 });
                 let run = command.output().expect("the command starts");
