@@ -119,6 +119,8 @@ function frame(now) {
   if (pictured === 'drawn') {
     pictured = true;
     at('poster').classList.add('gone');
+    // Windows of Bevy take the focus.
+    if (!player.resize) canvas.blur();
     tell('picture', { milliseconds: performance.now() - times.compiled });
   }
   if (!changed) return;

@@ -7,6 +7,7 @@ use bevy::asset::AssetMetaCheck;
 use bevy::camera::PerspectiveProjection;
 use bevy::core_pipeline::tonemapping::Tonemapping;
 use bevy::prelude::*;
+use bevy::render::renderer::RenderQueue;
 use bevy_gs4d::prelude::*;
 use bevy_gs4d::scene::RuntimeScene;
 use gs4d_web::{About, Opening, Step, report_panics};
@@ -14,7 +15,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use wasm_bindgen::prelude::wasm_bindgen;
 use web_sys::HtmlCanvasElement;
 
-/// Frames from a call until its picture is on the canvas: the app draws the frame after the one in which it was called.
+/// Frames from a call until its picture has been given to the device.
 const FRAMES: u32 = 2;
 
 /// A player on a canvas.
@@ -35,10 +36,12 @@ struct State {
     /// From the page: a scene to show, and the camera and the time to draw.
     scene: Option<Box<RuntimeScene>>,
     shot: Option<Shot>,
-    /// From the app: whether the scene is shown, why not, and the frames until the last picture is on the canvas.
+    /// From the app: whether the scene is shown, why not, the frames until the last picture is on the canvas, and whether only the device has
+    /// to finish it.
     shown: bool,
     failed: Option<String>,
     left: u32,
+    submitted: bool,
 }
 
 struct Shot {
@@ -164,6 +167,7 @@ fn setup(mut commands: Commands) {
 fn obey(
     mut commands: Commands,
     shared: Res<Shared>,
+    queue: Option<Res<RenderQueue>>,
     mut clear: ResMut<ClearColor>,
     mut captures: ResMut<Assets<GaussianCapture>>,
     mut shown: Query<(Entity, &GaussianCapture3d, &CaptureState, &mut Playback)>,
@@ -186,7 +190,16 @@ fn obey(
         CaptureState::Failed(message) if !state.shown => state.failed = Some(message.clone()),
         CaptureState::Loading | CaptureState::Failed(_) => {}
     }
-    state.left = state.left.saturating_sub(1);
+    if state.left > 1 {
+        state.left -= 1;
+    } else if let (1, false, Some(queue)) = (state.left, state.submitted, queue) {
+        state.submitted = true;
+        let shared = shared.clone();
+        queue.on_submitted_work_done(move || {
+            let mut state = shared.state();
+            (state.left, state.submitted) = (0, false);
+        });
+    }
     if let (Some(shot), Some(capture)) = (state.shot.take(), captures.get(capture)) {
         playback.time = capture.seconds_at(shot.time);
         let (transform, projection) = &mut *camera;
