@@ -6,7 +6,7 @@ use crate::support::data::data;
 use bevy_gs4d::codec::{ReadOptions, load};
 use bevy_gs4d::gaussian::{Gaussian, Harmonics};
 use bevy_gs4d::scene::{Form, GaussianScene, RuntimeScene, SceneForm};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// The factor of the coefficient of degree 0.
 const SH_C0: f32 = 0.282_094_8;
@@ -15,7 +15,7 @@ fn folder() -> Option<PathBuf> {
     Some(data()?.join("formats")).filter(|folder| folder.is_dir())
 }
 
-fn open(folder: &PathBuf, name: &str, count: usize) -> GaussianScene {
+fn open(folder: &Path, name: &str, count: usize) -> GaussianScene {
     let scene = load(&folder.join(name), &ReadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(scene.len(), count, "{name}: number of Gaussians");
     scene
