@@ -40,7 +40,7 @@ pub(super) struct ExportVerb {
     /// The file to write; with --sequence a folder, which is created if it does not exist.
     #[arg(value_name = "OUT")]
     out: PathBuf,
-    /// Write the Gaussians that are drawn at this time, in the unit of the capture. A capture at rest needs no time.
+    /// One time: the Gaussians that are drawn then, in the unit of the capture. A capture at rest needs no time.
     #[arg(long, value_name = "T", value_parser = values::number, allow_hyphen_values = true, conflicts_with = "sequence")]
     time: Option<f32>,
     /// Write a file for each frame.
