@@ -12,6 +12,7 @@ use crate::support::folders::{contents, names};
 use crate::support::no_gpu::no_gpu;
 use crate::support::random::Random;
 use bevy_gs4d::codec::package::{self, WriteSettings};
+use bevy_gs4d::internal::codec::read_bytes;
 use bevy_gs4d::offline;
 use bevy_gs4d::renderer::GpuContext;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
@@ -292,6 +293,7 @@ impl Act<'_> {
 fn is_whole(name: &str, bytes: &[u8]) -> bool {
     match Path::new(name).extension().and_then(OsStr::to_str) {
         Some("gs4d") => package::read(Cursor::new(bytes)).is_ok(),
+        Some("ply") => read_bytes(Path::new(name), bytes).is_ok(),
         Some("png") => image::load_from_memory(bytes).is_ok(),
         Some("json") => serde_json::from_slice::<Value>(bytes).is_ok(),
         Some("html") => bytes.ends_with(b"</html>\n"),
