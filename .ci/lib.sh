@@ -12,7 +12,7 @@ exec </dev/null
 
 # The features that can be built separately, without and with Bevy. `default` implies `bevy`; `openxr` is not tested; `web` is for wasm32, where the
 # pages are built with it.
-without_bevy=(renderer offline cli)
+without_bevy=(renderer offline fourdgs cli)
 with_bevy=(bevy pbr picking testing inspector viewer)
 # Those that need many further crates: only .ci/full builds them.
 of_full=(storage)

@@ -43,7 +43,7 @@ pub(super) struct ExportVerb {
     /// One time: the Gaussians that are drawn then, in the unit of the capture. A capture at rest needs no time.
     #[arg(long, value_name = "T", value_parser = values::number, allow_hyphen_values = true, conflicts_with = "sequence")]
     time: Option<f32>,
-    /// Write a file for each frame.
+    /// Frames of the whole capture, a file for each.
     #[arg(long)]
     sequence: bool,
     /// Format of the files [default: by the extension of OUT; of a sequence ply].

@@ -116,13 +116,13 @@ pub fn begin(
     }
     let region = Region::of(pairs.iter().map(|(view, _)| *view))?;
     let (points, start) = points(&pairs, &region, trained_with.time_interval, settings)?;
-    let span = trained_with.time_span();
+    let (span, background) = (trained_with.time_span(), trained_with.background);
     let usual = || usual_time_scale(pairs.iter().map(|(view, _)| view.time).collect());
     let scale_t = settings.time_scale.unwrap_or_else(usual) as f32 * span;
     let (degree, degree_t) = (settings.degree.min(3), if settings.degree >= 3 { settings.degree_t.min(2) } else { 0 });
     let scene = GaussianScene {
         form: SceneForm::Trained(trained(&points, scale_t, degree, degree_t)),
-        environment: (rows > 0).then(|| surroundings(&pairs, rows)),
+        environment: (rows > 0).then(|| surroundings(background, rows)),
         filter: None,
         trained_with,
         playback,
