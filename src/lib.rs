@@ -23,8 +23,9 @@
 //! ```
 //!
 //! 1. [`codec`] reads a file into a scene, or refuses it with an error that names what is wrong: [`codec::checkpoint`] through a
-//!    restricted unpickler, [`codec::package`] with a checksum on every byte. [`codec::load`] tells the formats apart by their first
-//!    bytes; [`offline::save()`] writes a file whole or not at all.
+//!    restricted unpickler, [`codec::package`] with a checksum on every byte, files of other makes (PLY, SPZ, SOG, glTF and so on) through
+//!    `codec::import`, which states what a scene does not show of them. [`codec::load`] tells the formats apart by their contents;
+//!    [`offline::save()`] writes a file whole or not at all, and `codec::export` writes for other programs.
 //! 2. [`scene`] is what a capture is: its Gaussians and their color in the trained, the sliced or the packed form, an environment map,
 //!    a temporal filter, levels of detail, the switches it was trained with, and how it is meant to be played.
 //! 3. [`gaussian`] is the maths. [`Parameters::slice`](gaussian::Parameters::slice) makes the runtime form, once: a 3D Gaussian in
