@@ -187,7 +187,8 @@ impl Splitting {
         let segments = f64::from(self.segments);
         let position = |time: f64| (time - begin) / span * segments;
         let [opens, closes] = curve.window.map(|time| position(f64::from(time)).round().clamp(0.0, segments));
-        if opens >= closes {
+        // A window of numbers that are not finite has no segment.
+        if opens.partial_cmp(&closes).is_none_or(|order| order.is_ge()) {
             return None;
         }
         let (opens, closes) = (opens as u32, closes as u32 - 1);

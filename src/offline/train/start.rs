@@ -1,7 +1,7 @@
 //! The Gaussians before the first step.
 //!
 //! In: training images, [`StartSettings`]. Out: a scene of native 4D Gaussians at points of the visual hull, or at random ones in the box
-//! that the cameras look at; an environment map behind them if the images cover all of their pixels.
+//! that the cameras look at; an environment map behind them on request.
 //!
 //! Opacity is 0.1; the spatial scale is the root of the mean squared distance to the three nearest points; the temporal scale is a share of
 //! the interval; no Gaussian is rotated or moves (section 5.4 of the 4DGS model).
@@ -35,8 +35,6 @@ const SH_C0: f32 = 0.282_094_79;
 const OUTSIDE: f32 = 0.1;
 /// Color of random points, the original's.
 const GRAY: f32 = 127.0 / 255.0;
-/// Rows of the environment map, unless asked for others.
-const ROWS: u32 = 128;
 /// Distance of points that fill a hull of too few, as a share of the half side of the box.
 const FILLING: f32 = 0.02;
 
@@ -78,9 +76,8 @@ pub struct StartSettings {
     pub degree: u32,
     /// Degree of color in time, 0 to 2; used only if `degree` is 3.
     pub degree_t: u32,
-    /// Rows of the environment map behind the Gaussians, which has twice as many columns; 0: no map; `None`: 128 if every image covers all of
-    /// its pixels, else no map.
-    pub environment: Option<u32>,
+    /// Rows of the environment map behind the Gaussians, which has twice as many columns; 0: no map. Default: 0.
+    pub environment: u32,
 }
 
 impl Default for StartSettings {
@@ -92,7 +89,7 @@ impl Default for StartSettings {
             seed: 0,
             degree: 3,
             degree_t: 2,
-            environment: None,
+            environment: 0,
         }
     }
 }
@@ -110,7 +107,7 @@ pub fn begin(
 ) -> Result<(GaussianScene, Start), StartError> {
     let pairs: Vec<(&View, &CoveredImage)> = images.pairs().collect();
     let has_gaps = pairs.iter().any(|(_, image)| image.has_gaps);
-    let rows = settings.environment.unwrap_or(if has_gaps { 0 } else { ROWS });
+    let rows = settings.environment;
     if rows > 0 && has_gaps {
         return Err(StartError::NoSurroundings);
     }
