@@ -147,7 +147,7 @@ impl Subject<'_> {
 /// Reads parts, which must have the inputs of the label, and puts them together. `count` is the number of views of all.
 ///
 /// # Errors
-/// As [`parts::in_order`], files that cannot be read.
+/// As `parts::in_order`, files that cannot be read.
 pub fn merge(paths: &[PathBuf], label: &Label, count: usize) -> Result<Evaluation, OfflineError> {
     let (paths, _) = parts::in_order(paths, Some(label))?;
     let mut all = Vec::new();

@@ -130,7 +130,7 @@ pub(crate) fn write_part(
 /// Returns the filter of the parts of all shards, which must have the inputs of the label. `count` is the number of Gaussians.
 ///
 /// # Errors
-/// As [`parts::in_order`], files that cannot be read, views that show nothing of the scene.
+/// As `parts::in_order`, files that cannot be read, views that show nothing of the scene.
 pub fn merge(
     paths: &[PathBuf],
     label: &Label,

@@ -3,7 +3,7 @@
 //! In: a checkpoint or the capture of [`train_dataset`](super::train::train_dataset), the views of its dataset, [`BakeSettings`]. Out: a package, and `NAME.report.json` and `NAME.report.html` next to a
 //! package `NAME.gs4d` ([`Baked`]). [`bake()`] is the list of stages. All stages before the evaluation store their results in the folder
 //! `OUT.bake` next to a package `OUT` ([`Store`](super::store::Store)), so that an interrupted bake resumes. Two bakes cannot use one
-//! folder at the same time; the jobs of a [`plan`], which are single stages, can.
+//! folder at the same time; the jobs of a `plan`, which are single stages, can.
 //!
 //! Every choice (score, count, step) depends on the validation views alone, which are not trained on; test views are drawn for the report,
 //! after the last choice.

@@ -63,7 +63,7 @@ pub(crate) fn write(
 /// Reads parts and puts their scores together. The parts must have the inputs of `expected`, or else those of the first part.
 ///
 /// # Errors
-/// As [`parts::in_order`], files that cannot be read, views that show nothing of the scene.
+/// As `parts::in_order`, files that cannot be read, views that show nothing of the scene.
 pub fn merge(paths: &[PathBuf], expected: Option<&Label>) -> Result<Scores, OfflineError> {
     let (paths, _) = parts::in_order(paths, expected)?;
     let mut merged: Option<Scores> = None;
