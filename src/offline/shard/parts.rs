@@ -4,6 +4,7 @@
 //! an error that names the first part that is missing, is there twice, or was computed from something else.
 
 use super::{Label, Shard, part};
+use crate::codec::text::printable;
 use crate::offline::OfflineError;
 use std::path::{Path, PathBuf};
 
@@ -26,6 +27,8 @@ pub(crate) fn in_order(paths: &[PathBuf], expected: Option<&Label>) -> Result<(V
                 Some(_) => "this command".to_owned(),
                 None => first.display().to_string(),
             };
+            // The texts of a label are those of a file.
+            let difference = printable(&difference);
             let message =
                 format!("{difference}, as {than} has: parts belong together if all their inputs are the same");
             return Err(OfflineError::at(path, message));
