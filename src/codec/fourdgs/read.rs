@@ -200,6 +200,7 @@ fn error(error: fourdgs::Error) -> ImportError {
 mod tests {
     use super::*;
     use crate::codec::import::source::InMemory;
+    use crate::codec::import::testing::gaussians;
     use crate::gaussian::Gaussian;
     use crate::scene::{Form, SceneForm};
     use fourdgs::{SceneExtras, WriteOptions, write_to_vec};
@@ -232,11 +233,6 @@ mod tests {
     fn read_file(bytes: &[u8]) -> Result<Imported, ImportError> {
         let source = Source { bytes, beside: &InMemory::default() };
         read(&source, &ReadOptions::default())
-    }
-
-    fn gaussians(imported: &Imported) -> &[Gaussian] {
-        let SceneForm::Ready(Form::Sliced(sliced)) = &imported.scene.form else { panic!("sliced") };
-        &sliced.gaussians
     }
 
     #[test]

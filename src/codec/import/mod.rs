@@ -19,6 +19,8 @@ pub(crate) mod source;
 pub(crate) mod splat;
 pub(crate) mod splatv;
 pub(crate) mod spz;
+#[cfg(test)]
+pub(crate) mod testing;
 
 pub use error::ImportError;
 pub(crate) use imported::Imported;

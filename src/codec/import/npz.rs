@@ -171,9 +171,8 @@ pub(crate) fn read(source: &Source<'_>, options: &ReadOptions) -> Result<Importe
 mod tests {
     use super::*;
     use crate::codec::import::source::InMemory;
+    use crate::codec::import::testing::gaussians;
     use crate::codec::npy::tests::npy;
-    use crate::gaussian::Gaussian;
-    use crate::scene::{Form, SceneForm};
     use std::io::Write;
     use zip::write::SimpleFileOptions;
 
@@ -221,11 +220,6 @@ mod tests {
     fn read_file(bytes: &[u8]) -> Result<Imported, ImportError> {
         let source = Source { bytes, beside: &InMemory::default() };
         read(&source, &ReadOptions::default())
-    }
-
-    fn gaussians(imported: &Imported) -> &[Gaussian] {
-        let SceneForm::Ready(Form::Sliced(sliced)) = &imported.scene.form else { panic!("sliced") };
-        &sliced.gaussians
     }
 
     #[test]

@@ -98,7 +98,8 @@ fn from_quat(quat: DQuat) -> [f32; 4] {
 mod tests {
     use super::*;
     use crate::codec::import::columns::Motion;
-    use crate::gaussian::{Harmonics, Parameters, SliceSettings};
+    use crate::codec::import::testing::gaussians_of_columns;
+    use crate::gaussian::Harmonics;
 
     fn columns() -> Columns {
         Columns {
@@ -118,16 +119,8 @@ mod tests {
     }
 
     fn covariances(columns: &Columns) -> Vec<DMat3> {
-        let parameters = Parameters {
-            mean: columns.mean.clone(),
-            log_scale: columns.log_scale.clone(),
-            rotation_l: columns.rotation.clone(),
-            opacity_logit: columns.opacity_logit.clone(),
-            ..Parameters::default()
-        };
-        let sliced = parameters.slice(&SliceSettings::default()).expect("Gaussians that can be drawn");
         let matrix = |[xx, xy, xz, yy, yz, zz]: [f64; 6]| DMat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]);
-        sliced.iter().map(|gaussian| matrix(gaussian.covariance.map(f64::from))).collect()
+        gaussians_of_columns(columns).iter().map(|gaussian| matrix(gaussian.covariance.map(f64::from))).collect()
     }
 
     #[test]

@@ -7,9 +7,10 @@ use crate::codec::export::clip::Clip;
 use crate::codec::export::table::{Export, What};
 use crate::codec::import::columns::{Columns, Motion, logit};
 use crate::codec::import::source::{InMemory, Source};
+use crate::codec::import::testing::gaussians_of_columns;
 use crate::codec::import::{Imported, sog};
 use crate::codec::options::ReadOptions;
-use crate::gaussian::{Gaussian, Harmonics, Parameters, SMALLEST_CUTOFF, SliceSettings};
+use crate::gaussian::{Gaussian, Harmonics, SMALLEST_CUTOFF};
 use crate::scene::random::Random;
 use crate::scene::{Form, GaussianScene, SceneForm, Sliced, UpAxis};
 use glam::Vec3;
@@ -76,24 +77,10 @@ fn sliced(scene: GaussianScene) -> Sliced {
     }
 }
 
-/// Returns the Gaussians of columns.
-fn gaussians(columns: &Columns) -> Vec<Gaussian> {
-    let parameters = Parameters {
-        mean: columns.mean.clone(),
-        log_scale: columns.log_scale.clone(),
-        rotation_l: columns.rotation.clone(),
-        opacity_logit: columns.opacity_logit.clone(),
-        ..Parameters::default()
-    };
-    let gaussians = parameters.slice(&SliceSettings::default()).expect("drawable");
-    let moving = gaussians.into_iter().zip(&columns.motion);
-    moving.map(|(own, &Motion { velocity, mean_t, sigma_t })| Gaussian { velocity, mean_t, sigma_t, ..own }).collect()
-}
-
 #[test]
 fn a_sogst_is_read_with_its_motion() {
     let columns = columns(6000, 2);
-    let before = gaussians(&columns);
+    let before = gaussians_of_columns(&columns);
     let Imported { scene, lost } = read(&written("sogst", &columns)).expect("intact");
     assert_eq!(lost, [""; 0], "nothing is lost");
     assert_eq!(scene.trained_with.time_interval, [0.0, 2.0], "seconds from 0, since timestamps are no seconds");

@@ -5,6 +5,8 @@
 
 use crate::codec::import::columns::SH_C0;
 use crate::gaussian::Harmonics;
+use crate::view::srgb;
+use glam::Vec3;
 
 /// Where the encoding changes from a line to a power.
 const LINE: f32 = 0.003_130_8;
@@ -28,18 +30,14 @@ pub(super) fn encode(harmonics: &mut Harmonics) {
 
 /// Returns the sRGB encoding of linear light, and its slope.
 fn encoded(linear: f32) -> (f32, f32) {
-    if linear <= LINE {
-        (12.92 * linear, 12.92)
-    } else {
-        (1.055 * linear.powf(1.0 / 2.4) - 0.055, 1.055 / 2.4 * linear.powf(1.0 / 2.4 - 1.0))
-    }
+    let slope = if linear <= LINE { 12.92 } else { 1.055 / 2.4 * linear.powf(1.0 / 2.4 - 1.0) };
+    (srgb::encode(Vec3::splat(linear)).x, slope)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::codec::import::columns::coefficient;
-    use glam::Vec3;
 
     #[test]
     fn small_changes_of_a_color_are_encoded_as_the_color_is() {
