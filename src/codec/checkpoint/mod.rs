@@ -31,10 +31,7 @@ use std::io::{BufReader, Read, Seek};
 use std::path::Path;
 
 /// Extensions of checkpoints, without the dot.
-pub const EXTENSIONS: &[&str] = &["pth"];
-
-/// The first bytes of every checkpoint, which is a zip archive that is not empty.
-pub const MAGIC: [u8; 4] = *b"PK\x03\x04";
+pub(crate) const EXTENSIONS: &[&str] = &["pth"];
 
 /// Reads a checkpoint. `cfg_args` is the text of the file of that name in the same folder; `None` if there is none.
 ///

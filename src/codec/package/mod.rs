@@ -37,7 +37,7 @@ use serde::Serialize;
 use std::io::{BufReader, Read, Seek, Write};
 
 /// Extensions of packages, without the dot.
-pub const EXTENSIONS: &[&str] = &["gs4d"];
+pub(crate) const EXTENSIONS: &[&str] = &["gs4d"];
 
 /// Largest number of Gaussians per section: small enough to decode one at a time in little memory, large enough to
 /// compress well.
