@@ -19,6 +19,7 @@
 //! | [`quantize`], [`convert`] | changes the form that a scene is stored in |
 //! | [`detail`](mod@detail) | makes the same capture with fewer Gaussians, for pictures of few pixels |
 //! | [`bake`](mod@bake), [`report`] | runs all steps in order, resumable, and writes a report |
+//! | `jobs` | plans a bake as jobs for many machines |
 //! | `fleet` | compares the results of many bakes on one page |
 //! | [`metrics`], `evaluation`, `fidelity`, `comparison` | measures how close pictures are |
 //! | [`ablation`] | tabulates the loss by every score, ratio and filter |
@@ -33,6 +34,7 @@
 
 pub mod ablation;
 pub mod bake;
+mod bake_settings;
 pub(crate) mod belonging;
 pub(crate) mod comparison;
 pub mod convert;
@@ -47,6 +49,7 @@ pub(crate) mod fidelity;
 pub(crate) mod files;
 pub mod fine_tune;
 pub(crate) mod fleet;
+pub(crate) mod jobs;
 pub(crate) mod layout;
 pub(crate) mod memory_check;
 pub mod metrics;

@@ -1,9 +1,13 @@
 //! The number of Gaussians whose package has a given size.
 //!
-//! In: a limit in bytes, a function from a number of Gaussians to the size of their package. Out: a number of Gaussians whose package is
-//! just below the limit.
+//! In: a limit in bytes, a function from a number of Gaussians to the size of their package, for instance that of [`Packages`]. Out: a number
+//! of Gaussians whose package is just below the limit.
 
-use super::{OfflineError, Progress};
+use super::prune::select;
+use super::quantize::{CompressSettings, Quality, compress};
+use super::{OfflineError, Progress, sliced, write_settings};
+use crate::codec::package;
+use crate::scene::{GaussianScene, TemporalFilter};
 
 /// Bytes for each Gaussian in the first estimate.
 const BYTES_OF_GAUSSIAN: u64 = 24;
@@ -13,6 +17,36 @@ const TRIES: usize = 5;
 const AIM: f64 = 0.985;
 /// The search ends at a package within the limit that has at least this fraction of its bytes.
 const NEAR: f64 = 0.97;
+
+/// The packages of some of a scene's Gaussians.
+pub(super) struct Packages<'a> {
+    pub scene: &'a GaussianScene,
+    /// Number of key-frames of the temporal filter.
+    pub key_frames: u32,
+    pub quality: Quality,
+    /// zstd level; `None`: that of [`write_settings`].
+    pub level: Option<i32>,
+    /// Whether the Gaussians are trained before: codebooks then follow their number.
+    pub is_trained: bool,
+}
+
+impl Packages<'_> {
+    /// Returns the size in bytes of the package of these Gaussians without training.
+    pub(super) fn size_of(&self, kept: &[u32]) -> Result<u64, OfflineError> {
+        let mut scene = select(self.scene, kept);
+        let (interval, cutoff) = (scene.trained_with.time_interval, scene.trained_with.marginal_cutoff);
+        let gaussians = sliced(&scene)?.into_owned();
+        scene.filter = Some(TemporalFilter::support(gaussians.into_iter(), interval, cutoff, self.key_frames - 1));
+        let options = match self.is_trained {
+            true => CompressSettings::suiting(self.quality, kept.len()),
+            false => CompressSettings::from(self.quality),
+        };
+        let (compressed, _) = compress(scene.into_runtime()?, &options)?;
+        let mut bytes = Vec::new();
+        package::write(&mut bytes, &compressed, &write_settings(&compressed.form, self.level))?;
+        Ok(bytes.len() as u64)
+    }
+}
 
 /// Returns how many of `total` Gaussians fit into a package of `limit` bytes, given the size of a package of any number and that of a
 /// single Gaussian. Begins the task "finding the count".

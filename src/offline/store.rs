@@ -222,6 +222,23 @@ impl Store {
         })
     }
 
+    /// Keeps a file that is no result, and stays: `STEM.EXTENSION` in the folder, or the first of `STEM-2.EXTENSION` and so on that is free or
+    /// has these bytes already. Returns its path.
+    ///
+    /// # Errors
+    /// A folder that cannot be written to, a full disk.
+    pub(crate) fn keep_aside(&self, stem: &str, extension: &str, bytes: &[u8]) -> Result<PathBuf, CodecError> {
+        let mut path = self.folder().join(format!("{stem}.{extension}"));
+        for number in 2_u64.. {
+            if !path.exists() || fs::read(&path).is_ok_and(|before| before == bytes) {
+                break;
+            }
+            path = self.folder().join(format!("{stem}-{number}.{extension}"));
+        }
+        write_beside(&path, |file| file.write_all(bytes))?;
+        Ok(path)
+    }
+
     /// Removes what was stored. The folder stays if it has other files.
     ///
     /// # Errors

@@ -5,18 +5,18 @@
 //! and losses are compared after a short training: the best choice before training is not the best choice after training.
 
 use super::inputs::Inputs;
-use super::job::Scoring;
 use super::size::count_of_size;
 use super::tuning::short;
 use crate::offline::engine::Engine;
+use crate::offline::jobs::job::{Scoring, shard_name};
+use crate::offline::jobs::merged_scores::merged_scores;
 use crate::offline::quality::Trial;
 use crate::offline::report::Tried;
 use crate::offline::score::Scores;
 use crate::offline::search::{Candidate, Goal, ScoreChoice, ScoreSearch, candidates};
-use crate::offline::shard::Shard;
 use crate::offline::stages::Stages;
 use crate::offline::store::Key;
-use crate::offline::stored::{Stored, Text};
+use crate::offline::stored::Text;
 use crate::offline::trained_search::TrainedSearch;
 use crate::offline::{OfflineError, Progress};
 use crate::scene::GaussianScene;
@@ -83,7 +83,7 @@ pub(super) fn score(
     }
     let scored = stages.run(SCORE, key, are_whole, |progress| {
         let scores = match scoring {
-            Scoring::Merge(shards) => merged(inputs, shards, key)?,
+            Scoring::Merge(shards) => merged_scores(&inputs.store, count, shards, key)?,
             Scoring::Whole | Scoring::Shard(_) => {
                 let Inputs { engine, subject, splits, .. } = inputs;
                 settings.scoring.scores(engine, subject, &splits.train, progress)?
@@ -96,31 +96,6 @@ pub(super) fn score(
 
 /// Name of the stage.
 const SCORE: &str = "score";
-
-/// Returns the name under which the sums of a shard are stored.
-pub(super) fn shard_name(shard: Shard) -> String {
-    format!("score-{}-of-{}", shard.index(), shard.count())
-}
-
-/// Puts the stored sums of all shards together.
-fn merged(inputs: &Inputs<'_>, shards: u32, key: Key) -> Result<Scores, OfflineError> {
-    let (store, count) = (&inputs.store, inputs.subject.scene.len());
-    let mut merged: Option<Scores> = None;
-    for shard in Shard::all(shards) {
-        let scores = store.load(&shard_name(shard), key).and_then(|bytes| Scores::decode(&bytes));
-        let scores = scores.filter(|scores| scores.len() == count).ok_or_else(|| {
-            let message = format!(
-                "has no result of the shard {shard} of the stage score: run --only score --shard {shard} before"
-            );
-            OfflineError::at(store.folder(), message)
-        })?;
-        match &mut merged {
-            Some(merged) => merged.merge(&scores),
-            None => merged = Some(scores),
-        }
-    }
-    Ok(merged.ok_or(OfflineError::NoScore)?.whole()?)
-}
 
 /// The stage prune: chooses the score and the count, given the key of the scores. Returns the key of the Gaussians that are kept.
 pub(super) fn choose(

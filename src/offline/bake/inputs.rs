@@ -2,24 +2,21 @@
 //!
 //! In: a scene, [`BakeSettings`]. Out: the views of its dataset, divided; the folder of results; the keys of the contents of all inputs.
 
-use super::job::{Job, Scoring};
-use super::settings::BakeSettings;
+use crate::offline::bake_settings::BakeSettings;
 use crate::offline::belonging::require_belonging;
 use crate::offline::convert::require_no_windows;
 use crate::offline::dataset::TrainingView;
 use crate::offline::engine::Engine;
-use crate::offline::fine_tune::{FineTuneSettings, TrainingImages};
+use crate::offline::fine_tune::{FineTuneSettings, TrainingImages, obstacle};
+use crate::offline::jobs::job::{FOLDER, Job, Scoring};
 use crate::offline::memory_check::{BY_RESOLUTION, Pictures};
 use crate::offline::metrics::MetricSet;
 use crate::offline::search::Goal;
 use crate::offline::splits::Splits;
 use crate::offline::store::{Key, Store};
 use crate::offline::{OfflineError, Progress, Subject, trained_pixel};
-use crate::scene::{GaussianScene, MAX_SEGMENTS, SceneForm};
+use crate::scene::{GaussianScene, MAX_SEGMENTS};
 use std::sync::Arc;
-
-/// Appended to the name of the package: the name of the folder of results.
-pub(super) const FOLDER: &str = ".bake";
 
 /// The inputs that the stages of a bake share.
 pub(super) struct Inputs<'a> {
@@ -131,15 +128,6 @@ impl<'a> Inputs<'a> {
             Goal::Keep(_) | Goal::Remove(_) | Goal::MaxLoss(_) => u64::MAX,
         }
     }
-}
-
-/// Returns why a scene of this form cannot be trained on these views; `None` if it can be.
-pub(super) fn obstacle(form: &SceneForm, views: &[TrainingView]) -> Option<String> {
-    if !matches!(form, SceneForm::Trained(_)) {
-        return Some("the scene is not in the trained form".to_owned());
-    }
-    let missing = views.iter().find(|view| !view.image.is_file())?;
-    Some(format!("{} is missing", missing.image.display()))
 }
 
 /// Checks that the pictures of every stage fit the memory and the GPU, before the first stage.

@@ -11,18 +11,15 @@
 mod choice;
 mod compression;
 mod inputs;
-mod job;
-pub(crate) mod plan;
 mod rounds;
-mod settings;
 mod size;
 mod summary;
 mod tuning;
 
-pub(crate) use job::{JOB_STAGES, Job, Scoring};
-pub use settings::BakeSettings;
+pub use super::bake_settings::BakeSettings;
 
 use super::engine::Engine;
+use super::jobs::job::Job;
 use super::prune::highest;
 use super::quantize::require_unpacked;
 use super::report::{BakeReport, write_with_report};

@@ -4,19 +4,13 @@
 //! is too large ([`Attempts`]).
 
 use super::inputs::Inputs;
-use super::settings::BakeSettings;
-use crate::codec::package;
-use crate::offline::package_size::{count_within, fitting};
-use crate::offline::prune::{highest, select};
-use crate::offline::quantize::{CompressSettings, compress};
+use crate::offline::bake_settings::BakeSettings;
+use crate::offline::package_size::{Packages, count_within, fitting};
+use crate::offline::prune::highest;
 use crate::offline::search::Goal;
 use crate::offline::store::{Key, Store};
-use crate::offline::{OfflineError, Progress, sliced, write_beside, write_settings};
-use crate::scene::TemporalFilter;
+use crate::offline::{OfflineError, Progress};
 use serde::{Deserialize, Serialize};
-use std::fs;
-use std::io::Write;
-use std::path::PathBuf;
 
 /// Most packages that a bake makes.
 const ATTEMPTS: usize = 4;
@@ -70,8 +64,7 @@ impl Attempts {
     ) -> Result<(), OfflineError> {
         let (limit, size, before) = (inputs.limit(), package.len() as u64, self.count());
         if self.made.len() + 1 == ATTEMPTS || before <= 1 {
-            let kept = kept_aside(inputs, package);
-            write_beside(&kept, |file| file.write_all(package))?;
+            let kept = inputs.store.keep_aside("too-large", "gs4d", package)?;
             let single = if before <= 1 { "not even with a single Gaussian; " } else { "" };
             let found = format!("{single}the last package that was made has {size} and is kept as {}", kept.display());
             return Err(too_small(inputs, limit, &found));
@@ -119,32 +112,9 @@ pub(super) fn count_of_size(
 
 /// Returns the size in bytes of a package of these Gaussians without training.
 fn size_of(inputs: &Inputs<'_>, kept: &[u32]) -> Result<u64, OfflineError> {
-    let settings = inputs.settings;
-    let mut scene = select(&inputs.subject.scene, kept);
-    let interval = scene.trained_with.time_interval;
-    let gaussians = sliced(&scene)?.into_owned();
-    scene.filter = Some(TemporalFilter::support(
-        gaussians.into_iter(),
-        interval,
-        scene.trained_with.marginal_cutoff,
-        inputs.key_frames() - 1,
-    ));
-    let options = match inputs.tunes() {
-        Some(_) => CompressSettings::suiting(settings.quality, kept.len()),
-        None => CompressSettings::from(settings.quality),
-    };
-    let (compressed, _) = compress(scene.into_runtime()?, &options)?;
-    let mut bytes = Vec::new();
-    package::write(&mut bytes, &compressed, &write_settings(&compressed.form, settings.level))?;
-    Ok(bytes.len() as u64)
-}
-
-/// Returns the path at which a package that is too large is kept: a new name in the folder of the bake.
-fn kept_aside(inputs: &Inputs<'_>, package: &[u8]) -> PathBuf {
-    let folder = inputs.store.folder();
-    let names = std::iter::once("too-large.gs4d".to_owned()).chain((2..).map(|n| format!("too-large-{n}.gs4d")));
-    let is_free = |path: &PathBuf| !path.exists() || fs::read(path).is_ok_and(|bytes| bytes == package);
-    names.map(|name| folder.join(name)).find(is_free).unwrap_or_default()
+    let (scene, BakeSettings { quality, level, .. }) = (&inputs.subject.scene, inputs.settings);
+    let is_trained = inputs.tunes().is_some();
+    Packages { scene, key_frames: inputs.key_frames(), quality: *quality, level: *level, is_trained }.size_of(kept)
 }
 
 /// Returns the error for a limit that no package meets; `found` describes the smallest package.

@@ -3,11 +3,11 @@
 //! In: the Gaussians before and after, the package, the choices, the test views. Out: the [`BakeReport`].
 
 use super::choice::Choice;
-use super::settings::BakeSettings;
 use super::tuning::Tuning;
 use crate::codec::package;
 use crate::gaussian::Gaussian;
 use crate::offline::OfflineError;
+use crate::offline::bake_settings::BakeSettings;
 use crate::offline::names;
 use crate::offline::quantize::Quality;
 use crate::offline::report::{

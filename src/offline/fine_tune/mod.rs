@@ -21,6 +21,7 @@ mod growth;
 pub(crate) mod loss;
 pub(crate) mod neighbors;
 pub(crate) mod noise;
+mod obstacle;
 mod optimized;
 mod outcome;
 mod parameters;
@@ -49,6 +50,7 @@ mod training;
 mod view_buffers;
 
 pub use growth::Growth;
+pub(crate) use obstacle::obstacle;
 pub use outcome::{CurvePoint, FineTuned};
 pub use phases::fine_tune;
 pub(crate) use phases::fine_tune_watched;

@@ -5,12 +5,11 @@
 //!
 //! Needs are estimates by the numbers of Gaussians, views and pixels, for time limits and the choice of machines.
 
-use super::choice::shard_name;
-use super::inputs::{FOLDER, obstacle};
-use super::settings::BakeSettings;
+use super::job::{FOLDER, shard_name};
+use crate::offline::bake_settings::BakeSettings;
 use crate::offline::dataset::TrainingView;
 use crate::offline::dataset::selection::distinct_cameras;
-use crate::offline::fine_tune::FineTuneSettings;
+use crate::offline::fine_tune::{FineTuneSettings, obstacle};
 use crate::offline::report::report_paths;
 use crate::offline::search::{Goal, ScoreChoice};
 use crate::offline::shard::Shard;

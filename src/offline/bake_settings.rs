@@ -53,7 +53,7 @@ pub struct BakeSettings {
 }
 
 impl BakeSettings {
-    /// Checks that the package and the reports can be written and are none of the files that are read. [`bake`](super::bake) checks this,
+    /// Checks that the package and the reports can be written and are none of the files that are read. [`bake`](super::bake::bake) checks this,
     /// too; a program can call this function before it reads a large checkpoint.
     ///
     /// # Errors

@@ -1,8 +1,11 @@
 //! One job of a bake: a stage, which one machine runs, given the results of the stages before it.
 //!
-//! In: the name of a stage. Out: a [`Job`].
+//! In: the name of a stage. Out: a [`Job`]; the names under which its results are stored.
 
 use crate::offline::shard::Shard;
+
+/// Appended to the name of the package: the name of the folder of results.
+pub(crate) const FOLDER: &str = ".bake";
 
 /// The stages that are jobs, by name, in order. The job `report` also evaluates.
 pub(crate) const JOB_STAGES: [(&str, &str); 8] = [
@@ -35,4 +38,9 @@ pub(crate) enum Scoring {
     Shard(Shard),
     /// The stored sums of this number of shards are put together.
     Merge(u32),
+}
+
+/// Returns the name under which the sums of a shard of the stage score are stored.
+pub(crate) fn shard_name(shard: Shard) -> String {
+    format!("score-{}-of-{}", shard.index(), shard.count())
 }
