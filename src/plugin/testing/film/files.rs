@@ -5,11 +5,12 @@
 
 use super::error::FilmError;
 use super::hold_out::Split;
+use super::writer::Writer;
 use crate::codec::CodecError;
-use crate::plugin::testing::{TestingError, save};
+use crate::plugin::testing::TestingError;
 use bevy::transform::components::Transform;
 use glam::UVec2;
-use image::RgbaImage;
+use image::Rgba32FImage;
 use serde::Serialize;
 use std::fs;
 use std::io::{self, ErrorKind};
@@ -18,6 +19,7 @@ use std::path::{Path, PathBuf};
 /// A dataset that is being written.
 pub(super) struct Files<'a> {
     folder: &'a Path,
+    writer: Writer,
     head: Head,
     frames: [Vec<Frame>; Split::ALL.len()],
 }
@@ -65,20 +67,20 @@ impl<'a> Files<'a> {
         }
         let tangent = (f64::from(fov_y) / 2.0).tan() * f64::from(size.x) / f64::from(size.y);
         let head = Head { camera_angle_x: 2.0 * tangent.atan(), w: size.x, h: size.y, seconds };
-        Ok(Self { folder, head, frames: Default::default() })
+        Ok(Self { folder, writer: Writer::begin(), head, frames: Default::default() })
     }
 
-    /// Writes a picture.
+    /// Adds a picture, which another thread writes.
     pub(super) fn add(
         &mut self,
         split: Split,
         [camera, time]: [usize; 2],
         seconds: f32,
         pose: &Transform,
-        picture: &RgbaImage,
+        picture: Rgba32FImage,
     ) -> Result<(), FilmError> {
         let name = format!("{}/c{camera:04}_t{time:04}", split.name());
-        save(picture, &self.folder.join(format!("{name}.png")))?;
+        self.writer.add(picture, self.folder.join(format!("{name}.png")))?;
         let [first, last] = self.head.seconds.map(f64::from);
         self.frames[split as usize].push(Frame {
             file_path: format!("./{name}"),
@@ -89,28 +91,31 @@ impl<'a> Files<'a> {
         Ok(())
     }
 
-    /// Writes the camera files. Returns the number of pictures for training, validation and test.
+    /// Waits for the pictures, and writes the camera files. Returns the number of pictures for training, validation and test.
     pub(super) fn finish(self) -> Result<[usize; 3], FilmError> {
+        let Self { folder, writer, head, frames } = self;
+        writer.finish()?;
         for split in Split::ALL {
-            let frames = &self.frames[split as usize];
+            let frames = &frames[split as usize];
             if !frames.is_empty() {
-                self.write(&self.folder.join(format!("transforms_{}.json", split.name())), frames)?;
+                let file = CameraFile { head: &head, frames };
+                write(&folder.join(format!("transforms_{}.json", split.name())), &file)?;
             }
         }
-        Ok([Split::Train, Split::Validation, Split::Test].map(|split| self.frames[split as usize].len()))
+        Ok([Split::Train, Split::Validation, Split::Test].map(|split| frames[split as usize].len()))
     }
+}
 
-    /// Writes under a temporary name, and renames the file once it is complete.
-    fn write(&self, path: &Path, frames: &[Frame]) -> Result<(), FilmError> {
-        let partial: PathBuf = path.with_extension("json.part");
-        let json = serde_json::to_vec_pretty(&CameraFile { head: &self.head, frames });
-        let written = json.map_err(io::Error::other).and_then(|json| fs::write(&partial, json));
-        written.and_then(|()| fs::rename(&partial, path)).map_err(|error| {
-            // A failure to remove the partial file is ignored: the first error is returned.
-            fs::remove_file(&partial).ok();
-            failed(path, error)
-        })
-    }
+/// Writes under a temporary name, and renames the file once it is complete.
+fn write(path: &Path, file: &CameraFile<'_>) -> Result<(), FilmError> {
+    let partial: PathBuf = path.with_extension("json.part");
+    let json = serde_json::to_vec_pretty(file);
+    let written = json.map_err(io::Error::other).and_then(|json| fs::write(&partial, json));
+    written.and_then(|()| fs::rename(&partial, path)).map_err(|error| {
+        // A failure to remove the partial file is ignored: the first error is returned.
+        fs::remove_file(&partial).ok();
+        failed(path, error)
+    })
 }
 
 fn failed(path: &Path, error: io::Error) -> FilmError {

@@ -7,6 +7,7 @@
 //! * `hold_out`: which split a picture belongs to
 //! * `shooting`: the pictures, from the app
 //! * `files`: the files of the dataset
+//! * `writer`: encodes and writes pictures while the next ones are drawn
 //! * `error`: why a scene could not be filmed
 
 mod error;
@@ -14,6 +15,7 @@ mod files;
 mod hold_out;
 mod rig;
 mod shooting;
+mod writer;
 
 pub use error::FilmError;
 pub use hold_out::HoldOut;

@@ -3,14 +3,13 @@
 //! In: an app and a [`Film`]. Out: the dataset's files; the app at the last time, with its own cameras as before.
 //!
 //! One camera is moved from pose to pose. It draws in linear light over transparent black, so that a pixel holds its color times its
-//! coverage; the color is divided by the coverage before it is sRGB-encoded.
+//! coverage. Pictures are encoded and written on other threads while the next ones are drawn.
 
 use super::error::FilmError;
 use super::files::Files;
 use super::hold_out::{HoldOut, Split};
 use super::rig::Rig;
 use crate::plugin::testing::{Offscreen, TestingError, read_hdr, settle, step};
-use crate::view::srgb;
 use bevy::app::App;
 use bevy::asset::Assets;
 use bevy::camera::{Camera, Camera3d, ClearColorConfig, Hdr, PerspectiveProjection, Projection};
@@ -23,7 +22,6 @@ use bevy::render::renderer::RenderDevice;
 use bevy::render::view::Msaa;
 use bevy::transform::components::Transform;
 use glam::{UVec2, Vec3};
-use image::{Rgba, Rgba32FImage, RgbaImage};
 use std::f32::consts::PI;
 use std::path::Path;
 use std::time::Duration;
@@ -87,7 +85,7 @@ pub struct Filmed {
 /// For each time in increasing order, the app advances to it as by [`step`], `set_time` receives the world and the time in seconds, and every
 /// camera of the rig draws while no time passes; with [staggered](Film::stagger) shutters, the app advances to the moment of each camera. A
 /// scene that the app's own time moves, such as a simulation, needs nothing in `set_time`: `|_, _| {}`. At least four updates draw each
-/// picture. The app's own cameras are inactive meanwhile. `progress` receives the number of pictures written and the number of all.
+/// picture. The app's own cameras are inactive meanwhile. `progress` receives the number of pictures drawn and the number of all.
 ///
 /// The pictures are 8-bit RGBA with straight alpha, which is the coverage: 1 on opaque meshes, 0 where nothing is drawn. Times become 0 to 1
 /// in the camera files, from the first time to the last; the entry `seconds` has the seconds.
@@ -228,9 +226,9 @@ fn shoot(
             let pose = Transform { scale: Vec3::ONE, ..film.rig.poses[place] };
             app.world_mut().entity_mut(camera).insert(pose);
             settle(app)?;
-            let picture = straight(&read_hdr(app, offscreen)?);
+            let picture = read_hdr(app, offscreen)?;
             let split = film.hold_out.split(place, index, times.len());
-            files.add(split, [place, index], seconds, &pose, &picture)?;
+            files.add(split, [place, index], seconds, &pose, picture)?;
             done += 1;
             progress(done, all);
         }
@@ -248,34 +246,9 @@ fn moments(film: &Film, times: &[Duration], time: usize) -> Vec<(Duration, usize
     moments
 }
 
-/// Converts linear light times coverage to sRGB-encoded colors with straight alpha. Colors without coverage are black.
-fn straight(picture: &Rgba32FImage) -> RgbaImage {
-    let byte = |value: f32| (value.clamp(0.0, 1.0) * 255.0).round() as u8;
-    RgbaImage::from_fn(picture.width(), picture.height(), |x, y| {
-        let [red, green, blue, alpha] = picture.get_pixel(x, y).0;
-        let covered = byte(alpha);
-        if covered == 0 {
-            return Rgba([0; 4]);
-        }
-        let color = srgb::encode((Vec3::new(red, green, blue) / alpha.min(1.0)).max(Vec3::ZERO));
-        Rgba([byte(color.x), byte(color.y), byte(color.z), covered])
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn colors_are_divided_by_their_coverage_in_linear_light() {
-        let linear = srgb::decode(Vec3::new(200.0, 100.0, 50.0) / 255.0);
-        let picture = Rgba32FImage::from_fn(3, 1, |x, _| {
-            let covered = x as f32 / 2.0;
-            Rgba([linear.x * covered, linear.y * covered, linear.z * covered, covered])
-        });
-        let pixels: Vec<[u8; 4]> = straight(&picture).pixels().map(|pixel| pixel.0).collect();
-        assert_eq!(pixels, [[0; 4], [200, 100, 50, 128], [200, 100, 50, 255]], "the color does not depend on coverage");
-    }
 
     #[test]
     fn staggered_cameras_film_at_different_moments_inside_the_interval() {
