@@ -1,11 +1,12 @@
 // sort_bins: sorts the splats of one bin by depth, one workgroup per bin; the second pass of tile bins.
-// In: the unordered bins that `project_bin` filled. Out: the pairs of each tile in order of depth, then slot, and the range of each
+// In: the unordered bins that `project_bin` or `fill_bins` filled. Out: the pairs of each tile in order of depth, then slot, and the range of each
 // tile; the counters of the next frame, cleared. If the buffers are too small for the splats of a bin or for the pairs of its tiles, their
 // ranges are NONE: `blend_blocks` searches all splats instead.
 //
 // The list is sorted in workgroup memory: into buckets, then by rank in each bucket. Most depths of a bin may be close together, so
 // the splats are first counted in a histogram of equal steps of depth, and the buckets are chosen to have about equal numbers of splats. A
-// list longer than LIST is sorted in rounds of ROUND splats, the nearest first.
+// list longer than LIST is sorted in rounds of ROUND splats, the nearest first. If bins are counted before they are filled (COUNTED), some
+// lists are much longer than others: their entries are first copied in order of parts, and read part by part.
 #import gs4d::types::{FrameUniforms, BIN_COUNTERS}
 #import gs4d::bins::{is_after, FIRST, NONE, SLOT_MASK}
 #import gs4d::nearest::{begin_search, clear_intervals, count_candidate, next_search}
@@ -42,6 +43,14 @@ const FACTOR_BITS: u32 = 10u;
 @group(0) @binding(3) var<storage, read> bin_entries: array<vec2<u32>>;
 @group(0) @binding(4) var<storage, read_write> tile_ranges: array<vec2<u32>>;
 @group(0) @binding(5) var<storage, read_write> pair_splats: array<u32>;
+#ifdef COUNTED
+// Room for a copy of each entry.
+@group(0) @binding(7) var<storage, read_write> ordered_entries: array<vec2<u32>>;
+var<private> is_ordered: bool;
+// The end of the last part that fits into a list, and of the first part.
+var<workgroup> last_end: atomic<u32>;
+var<workgroup> next_end: atomic<u32>;
+#endif
 
 // Before sorting: the depth keys of the list, unordered; in rounds also the second words of its entries, from ROUND on. After sorting: the
 // second words, in order. The key at LIST is greater than all others.
@@ -78,14 +87,24 @@ struct FourEntries {
     words: vec4<u32>,
 }
 
+// Returns an entry, from the ordered copy if there is one.
+fn load_entry(i: u32) -> vec2<u32> {
+#ifdef COUNTED
+    if is_ordered {
+        return ordered_entries[i];
+    }
+#endif
+    return bin_entries[i];
+}
+
 // Returns entries `i`, `i + THREADS`, .. of a bin of `count` entries; indices are clamped to the last. The entries are loaded at once, so that
 // a thread waits for memory once.
 fn four_entries(first: u32, i: u32, count: u32) -> FourEntries {
     let at = first + min(vec4(i) + THREADS * vec4(0u, 1u, 2u, 3u), vec4(count - 1u));
-    let a = bin_entries[at.x];
-    let b = bin_entries[at.y];
-    let c = bin_entries[at.z];
-    let d = bin_entries[at.w];
+    let a = load_entry(at.x);
+    let b = load_entry(at.y);
+    let c = load_entry(at.z);
+    let d = load_entry(at.w);
     return FourEntries(vec4(a.x, b.x, c.x, d.x), vec4(a.y, b.y, c.y, d.y));
 }
 
@@ -219,7 +238,7 @@ fn first_of(bucket: u32) -> u32 {
 // Returns the second word of the entry of a splat in the list, as `collect` listed it.
 fn word_of(i: u32, first: u32, whole: bool) -> u32 {
     if whole {
-        return bin_entries[first + i].y;
+        return load_entry(first + i).y;
     }
     return list[ROUND + i];
 }
@@ -517,6 +536,98 @@ fn reserve_all(first: u32, count: u32, corner: vec2<u32>, thread: u32) {
     reserve(corner, thread);
 }
 
+#ifdef COUNTED
+// Returns the part, below THREADS, of the splats of a bin that a key is in which is `offset` above the least key: `each` splats or about as
+// many, in order of depth. `steps` has the numbers of splats in earlier steps.
+fn part_of(offset: u32, width: u32, each: u32) -> u32 {
+    let before = atomicLoad(&steps[offset >> width]);
+    let count = atomicLoad(&steps[(offset >> width) + 1u]) - before;
+    // The position of the key in its step, from 0 to 1, with as many bits as the product has room for.
+    let bits = min(min(countLeadingZeros(count), width), 16u);
+    let fraction = (offset & ((1u << width) - 1u)) >> (width - bits);
+    return (before + ((fraction * count) >> bits)) / each;
+}
+
+// Copies the entries of a bin in order of parts. Returns the end of the part that has the number of the thread.
+fn order_parts(first: u32, count: u32, thread: u32) -> u32 {
+    atomicStore(&steps[thread], 0u);
+    atomicStore(&buckets[thread], 0u);
+    let low = workgroupUniformLoad(&least_of_all);
+    let width = step_width(workgroupUniformLoad(&greatest_of_all) - low);
+    for (var begin = thread; begin < count; begin += 4u * THREADS) {
+        let four = four_entries(first, begin, count);
+        for (var k = 0u; k < 4u && begin + k * THREADS < count; k++) {
+            atomicAdd(&steps[(four.keys[k] - low) >> width], 1u);
+        }
+    }
+    workgroupBarrier();
+    let before_step = sum_before(atomicLoad(&steps[thread]), thread);
+    atomicStore(&steps[thread], before_step);
+    if thread == 0u {
+        atomicStore(&steps[STEPS], count);
+    }
+    workgroupBarrier();
+    let each = count / THREADS + 1u;
+    for (var begin = thread; begin < count; begin += 4u * THREADS) {
+        let four = four_entries(first, begin, count);
+        for (var k = 0u; k < 4u && begin + k * THREADS < count; k++) {
+            atomicAdd(&buckets[part_of(four.keys[k] - low, width, each)], 1u);
+        }
+    }
+    workgroupBarrier();
+    let own = atomicLoad(&buckets[thread]);
+    let before = sum_before(own, thread);
+    atomicStore(&buckets[thread], before);
+    workgroupBarrier();
+    for (var begin = thread; begin < count; begin += 4u * THREADS) {
+        let four = four_entries(first, begin, count);
+        for (var k = 0u; k < 4u && begin + k * THREADS < count; k++) {
+            let place = atomicAdd(&buckets[part_of(four.keys[k] - low, width, each)], 1u);
+            ordered_entries[first + place] = vec2(four.keys[k], four.words[k]);
+        }
+    }
+    storageBarrier();
+    workgroupBarrier();
+    is_ordered = true;
+    return before + own;
+}
+
+// Returns the end of the last part after `begin` up to which the entries fit into a list; if none fits, of the first. `end` is the end of the
+// part that has the number of the thread.
+fn end_of_round(begin: u32, end: u32, thread: u32) -> u32 {
+    if thread == 0u {
+        atomicStore(&last_end, 0u);
+        atomicStore(&next_end, 0xffffffffu);
+    }
+    workgroupBarrier();
+    if end > begin {
+        atomicMin(&next_end, end);
+        if end - begin <= LIST {
+            atomicMax(&last_end, end);
+        }
+    }
+    return max(workgroupUniformLoad(&last_end), workgroupUniformLoad(&next_end));
+}
+#endif
+
+// Sorts a list of the entries of a bin, all of which have been reserved pairs, in rounds.
+fn sort_in_rounds(first: u32, all: u32, corner: vec2<u32>, thread: u32) {
+    // The last position that has been sorted, and the number of entries up to it.
+    var lower = FIRST;
+    var done = 0u;
+    while done < all {
+        var upper = NONE;
+        if all - done > ROUND {
+            upper = last_fitting(first, all, lower, thread);
+        }
+        let count = collect(first, all, false, lower, upper, thread);
+        sort_list(first, count, false, thread);
+        write_pairs(count, corner, true, thread);
+        done += count;
+        lower = upper;
+    }
+}
+
 @compute @workgroup_size(THREADS)
 #ifdef SUBGROUPS_OF_32
 fn sort_bins(
@@ -528,9 +639,9 @@ fn sort_bins(
 #else
 fn sort_bins(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
 #endif
-    let capacity = frame.binning.y;
     let first_bin = BIN_COUNTERS + frame.binning.w;
-    let bin = group.y * ((frame.tiles.x + side() - 1u) / side()) + group.x;
+    let grid = (frame.tiles + side() - 1u) / side();
+    let bin = group.y * grid.x + group.x;
     let binned = bins[first_bin + bin];
     if thread == 0u {
         atomicMax(&next_bins[4], binned);
@@ -547,32 +658,51 @@ fn sort_bins(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
             atomicStore(&next_bins[3], select(bins[0], 0xffffffffu, bins[1] > 0u));
         }
     }
+#ifdef COUNTED
+    // The place of the bin is after its last entry.
+    let last = bins[first_bin + grid.x * grid.y + bin];
+    let first = last - binned;
+    let fits = last <= min(arrayLength(&bin_entries), arrayLength(&ordered_entries));
+#else
+    let first = bin * frame.binning.y;
+    let fits = binned <= frame.binning.y;
+#endif
     let corner = side() * group.xy;
-    if binned == 0u || binned > capacity {
+    if binned == 0u || !fits {
         if thread < side() * side() {
             write_range(corner, thread, select(NONE, vec2(0u), binned == 0u));
         }
         return;
     }
-    let first = bin * capacity;
+#ifdef COUNTED
+    let is_long = binned > LIST;
+    var end_of_part = binned;
+    if is_long {
+        reserve_all(first, binned, corner, thread);
+        end_of_part = order_parts(first, binned, thread);
+    }
+    var begin = 0u;
+    while begin < binned {
+        var end = binned;
+        if is_long {
+            end = end_of_round(begin, end_of_part, thread);
+        }
+        let count = end - begin;
+        if count <= LIST {
+            sort_list(first + begin, collect(first + begin, count, true, FIRST, NONE, thread), true, thread);
+            write_pairs(count, corner, is_long, thread);
+        } else {
+            sort_in_rounds(first + begin, count, corner, thread);
+        }
+        begin = end;
+    }
+#else
     if binned <= LIST {
         sort_list(first, collect(first, binned, true, FIRST, NONE, thread), true, thread);
         write_pairs(binned, corner, false, thread);
         return;
     }
     reserve_all(first, binned, corner, thread);
-    // The last position that has been sorted, and the number of entries up to it.
-    var lower = FIRST;
-    var done = 0u;
-    while done < binned {
-        var upper = NONE;
-        if binned - done > ROUND {
-            upper = last_fitting(first, binned, lower, thread);
-        }
-        let count = collect(first, binned, false, lower, upper, thread);
-        sort_list(first, count, false, thread);
-        write_pairs(count, corner, true, thread);
-        done += count;
-        lower = upper;
-    }
+    sort_in_rounds(first, binned, corner, thread);
+#endif
 }

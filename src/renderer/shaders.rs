@@ -24,6 +24,7 @@ const LIBRARIES: &[Library] = &[
     ("color", include_str!("../../shaders/shared/color.wgsl")),
     ("projection", include_str!("../../shaders/shared/projection.wgsl")),
     ("bins", include_str!("../../shaders/shared/bins.wgsl")),
+    ("filling", include_str!("../../shaders/shared/filling.wgsl")),
     ("nearest", include_str!("../../shaders/shared/nearest.wgsl")),
     ("pixel", include_str!("../../shaders/shared/pixel.wgsl")),
 ];
@@ -37,6 +38,8 @@ const PASSES: &[Library] = &[
     ("ranges", include_str!("../../shaders/global_sort/ranges.wgsl")),
     ("blend", include_str!("../../shaders/global_sort/blend.wgsl")),
     ("project_bin", include_str!("../../shaders/tile_bins/project_bin.wgsl")),
+    ("place_bins", include_str!("../../shaders/tile_bins/place_bins.wgsl")),
+    ("fill_bins", include_str!("../../shaders/tile_bins/fill_bins.wgsl")),
     ("colors", include_str!("../../shaders/tile_bins/colors.wgsl")),
     ("sort_bins", include_str!("../../shaders/tile_bins/sort_bins.wgsl")),
     ("blend_blocks", include_str!("../../shaders/tile_bins/blend_blocks.wgsl")),

@@ -7,7 +7,7 @@ use crate::support::composed::{compose, pass_names};
 use bevy_gs4d::internal::offline::shaders::{ATOMIC_SUMS, COMPAT, COMPAT_WITHOUT_TIME};
 use bevy_gs4d::internal::renderer::global_sort::AtOnce;
 use bevy_gs4d::internal::renderer::shaders::{BINNED, COPIED_INSTANCE, MULTISAMPLED, SHADERS, SUBGROUPS_OF_32};
-use bevy_gs4d::internal::renderer::tile_bins::{Blending, EIGHT_AT_ONCE, FEW_BINS, LARGE_BATCHES, Lists};
+use bevy_gs4d::internal::renderer::tile_bins::{Blending, COUNTED, EIGHT_AT_ONCE, FEW_BINS, LARGE_BATCHES, Lists};
 use bevy_gs4d::renderer::{ColorPrecision, Storage};
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 use std::collections::BTreeSet;
@@ -69,7 +69,8 @@ fn every_pass_composes_and_is_valid() {
     });
     let lists = Lists::ALL
         .into_iter()
-        .flat_map(|lists| [&[][..], SUBGROUPS_OF_32].map(|device| [lists.definitions(), device].concat()));
+        .flat_map(|lists| [&[][..], COUNTED].map(|counted| [lists.definitions(), counted].concat()))
+        .flat_map(|sorting| [&[][..], SUBGROUPS_OF_32].map(|device| [&sorting[..], device].concat()));
     let storages = Storage::ALL.map(|storage| storage.definitions().to_vec());
     let copied = storages.iter().chain(&binned).map(|definitions| [&definitions[..], COPIED_INSTANCE].concat());
     let copied: Vec<_> = copied.collect();
@@ -95,7 +96,7 @@ fn every_pass_composes_and_is_valid() {
 #[test]
 fn sort_bins_computes_its_indices_from_integers() {
     for lists in Lists::ALL {
-        let module = compose("sort_bins", lists.definitions()).expect("it composes");
+        let module = compose("sort_bins", &[lists.definitions(), COUNTED].concat()).expect("it composes");
         let functions = module.functions.iter().map(|(_, function)| function);
         for function in functions.chain(module.entry_points.iter().map(|entry| &entry.function)) {
             let floats = function.expressions.iter().any(|(_, expression)| {
@@ -114,7 +115,8 @@ fn workgroup_memory_is_within_the_required_limits() {
         [[LARGE_BATCHES, Blending::All.definitions()], [EIGHT_AT_ONCE, Blending::ColorBehindSurfaces.definitions()]]
             .map(|definitions| ("blend_blocks", definitions.concat(), 32 * 1024));
     let large = large.iter().map(|(name, definitions, limit)| (*name, &definitions[..], *limit));
-    let sorting = Lists::ALL.map(|lists| ("sort_bins", lists.definitions(), lists.memory()));
+    let sorting = Lists::ALL.map(|lists| ([lists.definitions(), COUNTED].concat(), lists.memory()));
+    let sorting = sorting.iter().map(|(definitions, limit)| ("sort_bins", &definitions[..], *limit));
     let binning = [("project_bin", &[][..], 16 * 1024)];
     for (name, definitions, limit) in blending.into_iter().chain(large).chain(sorting).chain(binning) {
         let module = compose(name, definitions).expect("the pass composes");

@@ -7,7 +7,7 @@
 use crate::support::composed::{compose, pass_names};
 use bevy_gs4d::internal::renderer::global_sort::AtOnce;
 use bevy_gs4d::internal::renderer::shaders::{COPIED_INSTANCE, MULTISAMPLED};
-use bevy_gs4d::internal::renderer::tile_bins::{Blending, EIGHT_AT_ONCE, LARGE_BATCHES, Lists};
+use bevy_gs4d::internal::renderer::tile_bins::{Blending, COUNTED, EIGHT_AT_ONCE, LARGE_BATCHES, Lists};
 use bevy_gs4d::renderer::Storage;
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -258,7 +258,9 @@ fn no_barrier_depends_on_a_value_that_differs_between_threads() {
     let blending = Blending::ALL.into_iter().flat_map(|blending| {
         [&[][..], LARGE_BATCHES].map(|batches| ("blend_blocks", [blending.definitions(), batches].concat()))
     });
-    let lists = Lists::ALL.into_iter().map(|lists| ("sort_bins", lists.definitions().to_vec()));
+    let lists = Lists::ALL
+        .into_iter()
+        .flat_map(|lists| [&[][..], COUNTED].map(|counted| ("sort_bins", [lists.definitions(), counted].concat())));
     let at_once = AtOnce::ALL.into_iter().map(|at_once| ("blend", [at_once.definitions(), MULTISAMPLED].concat()));
     let readers = Storage::ALL.into_iter().flat_map(|storage| {
         [("project_bin", &[][..]), ("colors", COPIED_INSTANCE)]

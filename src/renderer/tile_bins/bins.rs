@@ -82,6 +82,16 @@ pub(in crate::renderer) fn first_guess(picture: UVec2, side: u32, slots: u32) ->
     bins.saturating_mul(slots.min(capacity).max(256))
 }
 
+/// Entries of all bins together, up to which each bin has room for as many splats as the fullest: [`EQUAL_ROOMS`], or
+/// [`EQUAL_ROOMS_OF_PAIR`] for each pair. Beyond it, bins are counted before they are filled, which takes two more dispatches.
+const EQUAL_ROOMS: u32 = 1 << 23;
+const EQUAL_ROOMS_OF_PAIR: u32 = 4;
+
+/// Returns the largest number of entries of all bins together with room for the same number of splats, in a view of so many pairs.
+pub(in crate::renderer) fn equal_rooms(pairs: u32) -> u32 {
+    pairs.saturating_mul(EQUAL_ROOMS_OF_PAIR).max(EQUAL_ROOMS)
+}
+
 /// Number of Gaussians of a part from which on each thread of `project_bin` processes two, and four Gaussians. If many Gaussians are absent,
 /// workgroups of more Gaussians are better utilized, but small parts need as many workgroups as possible.
 const MANY_GAUSSIANS: u32 = 1 << 18;

@@ -16,7 +16,7 @@ use wgpu::{BindingResource, BufferUsages};
 pub(in crate::renderer) struct BinBuffers {
     /// Size of all buffers.
     pub bytes: u64,
-    /// Counters (see [`BIN_COUNTERS`]), of parts and of bins.
+    /// Counters (see [`BIN_COUNTERS`]), of parts and of bins; the place of each bin.
     pub bins: [wgpu::Buffer; 2],
     pub blend_blocks: wgpu::BindGroup,
     /// One [`SplatShape`] for each slot.
@@ -26,6 +26,7 @@ pub(in crate::renderer) struct BinBuffers {
     /// Color of each slot.
     splat_colors: wgpu::Buffer,
     pub(super) project_bin: [wgpu::BindGroup; 2],
+    pub(super) fill_bins: [wgpu::BindGroup; 2],
     pub(super) sort_bins: [wgpu::BindGroup; 2],
     pub(super) colors: [wgpu::BindGroup; 2],
 }
@@ -57,9 +58,10 @@ impl BinBuffers {
         let tile_ranges = storage("gs4d tile ranges", u64::from(tiles(sizes.picture).element_product()), 8, none);
         // The largest number of bins of a picture of this size.
         let count = bin_grid(sizes.picture, SIDES[0]).element_product();
-        let counters = u64::from(count + BIN_COUNTERS + sizes.parts);
+        let counters = u64::from(2 * count + BIN_COUNTERS + sizes.parts);
         let bins = [(); 2].map(|()| storage("gs4d bins", counters, 4, BufferUsages::COPY_SRC));
         let entries = storage("gs4d bin entries", entries, 8, none);
+        let ordered = storage("gs4d ordered entries", u64::from(sizes.ordered.max(1)), 8, none);
         let visible = storage("gs4d visible", slots, size_of::<VisibleSplat>(), none);
         let splat_colors = storage("gs4d splat colors", slots, COLOR_BYTES, none);
 
@@ -73,8 +75,10 @@ impl BinBuffers {
         let project_bin = both.map(|[now, _]| {
             group("gs4d project_bin", &layouts.project_bin, &instance, &[&splats, now, &entries, &visible])
         });
+        let fill_bins = both
+            .map(|[now, _]| group("gs4d fill_bins", &layouts.fill_bins, &frame, &[&splats, now, &entries, &visible]));
         let sort_bins = both.map(|[now, next]| {
-            let buffers = [now, next, &entries, &tile_ranges, &pair_splats, &visible];
+            let buffers = [now, next, &entries, &tile_ranges, &pair_splats, &visible, &ordered];
             group("gs4d sort_bins", &layouts.sort_bins, &frame, &buffers)
         });
         let colors =
@@ -83,7 +87,7 @@ impl BinBuffers {
         let ranges = tile_ranges.as_entire_binding();
         let blend_blocks = group("gs4d blend_blocks", &layouts.blend_blocks, &ranges, &lists);
         let bytes = bytes.get();
-        Self { bytes, bins, blend_blocks, splats, visible, splat_colors, project_bin, sort_bins, colors }
+        Self { bytes, bins, blend_blocks, splats, visible, splat_colors, project_bin, fill_bins, sort_bins, colors }
     }
 
     /// Creates the bind groups of `motion`, given its `uniforms`.

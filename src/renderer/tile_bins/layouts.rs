@@ -10,6 +10,8 @@ use crate::renderer::layout::{FrameUniforms, INSTANCES_BOUND, MotionUniforms};
 #[derive(Debug)]
 pub(in crate::renderer) struct BinLayouts {
     pub project_bin: wgpu::BindGroupLayout,
+    /// Of `place_bins` and `fill_bins`.
+    pub fill_bins: wgpu::BindGroupLayout,
     pub sort_bins: wgpu::BindGroupLayout,
     pub colors: wgpu::BindGroupLayout,
     pub blend_blocks: wgpu::BindGroupLayout,
@@ -24,10 +26,11 @@ impl BinLayouts {
         let new = |label, bindings: &[Bind]| group_layout(device, label, bindings);
         Self {
             project_bin: new("gs4d project_bin", &[INSTANCE, Write, Write, Write, Write]),
-            // The shader does not read the last buffer, the list of the visible splats. Because it is bound, the memory barrier for the
+            fill_bins: new("gs4d fill_bins", &[FRAME, Read, Write, Write, Read]),
+            // The shader does not read the last but one buffer, the list of the visible splats. Because it is bound, the memory barrier for the
             // buffers that `project_bin` writes and `colors` reads comes before `sort_bins`, not between `sort_bins` and `colors`, so that
             // these two run at the same time.
-            sort_bins: new("gs4d sort_bins", &[FRAME, Read, Write, Read, Write, Write, Read]),
+            sort_bins: new("gs4d sort_bins", &[FRAME, Read, Write, Read, Write, Write, Read, Write]),
             colors: new("gs4d colors", &[INSTANCE, Read, Read, Write]),
             blend_blocks: new("gs4d blend_blocks", &[Read, Read, Read, Read, Read]),
             motion: new("gs4d motion", &[INSTANCE, BEFORE, Read, Read, Read, Write]),

@@ -44,7 +44,8 @@ fn of_sort_bins(crowd: Crowd) -> u64 {
     let round = list / 2;
     // A loop over entries has an inner loop over four of them.
     let scan = 5 * fullest / (4 * threads) + OF_STEP;
-    (fullest / round + 1) * ((1 + STEPS) * scan + sort(round) + 100)
+    // Bins that are counted first are ordered by four scans.
+    4 * scan + (fullest / round + 1) * ((1 + STEPS) * scan + sort(round) + 100)
 }
 
 /// Returns whether tile bins draw a frame with these counts completely.

@@ -11,6 +11,16 @@
 //!
 //! Each bin is sorted by one workgroup, in workgroup memory. `blend_blocks` blends each tile in blocks of 8 x 4 pixels.
 //!
+//! All bins have room for as many splats as the fullest bin of earlier frames, and a reserve. Where this would take too much memory, since few bins
+//! are full, `project_bin` only counts the splats of each bin, and two more passes fill bins with room for exactly these:
+//!
+//! | pass | reads | writes |
+//! |---|---|---|
+//! | `place_bins` | number of splats of each bin | place of each bin among the entries of all bins |
+//! | `fill_bins` | list of the visible splats, splats, places of bins | unordered bins |
+//!
+//! `sort_bins` then copies the entries of long bins in order of parts before it sorts part by part, so that its time grows in proportion to them.
+//!
 //! If a frame has more splats or pairs than the buffers can hold, the entries of a bin, or the pairs of whole bins, are not written:
 //! `blend_blocks` searches all splats for the nearest splats of such a tile.
 
@@ -23,14 +33,14 @@ mod record;
 mod state;
 mod variant;
 
-pub(super) use bins::{MAX_SLOTS, bin_side, few_bins, first_guess, large_batches, per_thread};
+pub(super) use bins::{MAX_SLOTS, bin_side, equal_rooms, few_bins, first_guess, large_batches, per_thread};
 pub(super) use buffers::BinBuffers;
 pub(super) use layouts::BinLayouts;
 pub(super) use loops::{Crowd, is_complete};
 pub(super) use passes::BinPasses;
 pub(super) use state::{BinRoom, BinState};
 pub(super) use variant::BinVariant;
-pub use variant::{Blending, EIGHT_AT_ONCE, FEW_BINS, LARGE_BATCHES, Lists};
+pub use variant::{Blending, COUNTED, EIGHT_AT_ONCE, FEW_BINS, LARGE_BATCHES, Lists};
 
 /// Names of the timed passes of a frame, in order. The last two are the passes of motions.
 pub(super) const TIMED_PASSES: &[&str] =

@@ -2,7 +2,7 @@
 //!
 //! In: a device, the variants that a view draws with. Out: pipelines; an error if the device refuses one, which is not kept.
 
-use super::variant::{BinVariant, FEW_BINS, Lists};
+use super::variant::{BinVariant, FEW_BINS};
 use crate::renderer::compiler::Compiler;
 use crate::renderer::error::GpuError;
 use crate::renderer::shaders::Storage;
@@ -16,8 +16,10 @@ pub(in crate::renderer) struct BinPasses {
     project_bin: [[[OnceLock<wgpu::ComputePipeline>; 3]; 2]; 2],
     /// Indexed by whether instances are copied, and by the storage.
     colors: [[OnceLock<wgpu::ComputePipeline>; 3]; 2],
-    /// In the order of [`Lists::ALL`].
-    sort_bins: [OnceLock<wgpu::ComputePipeline>; 3],
+    /// `place_bins` and `fill_bins`.
+    counted: OnceLock<[wgpu::ComputePipeline; 2]>,
+    /// Indexed by whether bins are counted before they are filled, and by [`BinVariant::lists`].
+    sort_bins: [[OnceLock<wgpu::ComputePipeline>; 3]; 2],
     /// By [`BinVariant::blend_index`].
     blend_blocks: [OnceLock<wgpu::ComputePipeline>; BinVariant::BLENDS],
 }
@@ -29,6 +31,7 @@ impl BinPasses {
             compiler,
             project_bin: Default::default(),
             colors: Default::default(),
+            counted: OnceLock::new(),
             sort_bins: Default::default(),
             blend_blocks: Default::default(),
         }
@@ -61,11 +64,15 @@ impl BinPasses {
                 self.colors[copied][storage as usize].get_or_init(|| made);
             }
         }
-        let lists = variant.lists;
-        if self.sort_bins(lists).is_none() {
-            let definitions = [lists.definitions(), compiler.subgroups].concat();
+        if variant.counted && self.counted().is_none() {
+            let pass = |name| compiler.pass(device, name, &[], &[Some(&own.fill_bins)]);
+            let made = [pass("place_bins")?, pass("fill_bins")?];
+            self.counted.get_or_init(|| made);
+        }
+        if self.sort_bins(variant).is_none() {
+            let definitions = [&variant.sort_definitions(), compiler.subgroups].concat();
             let made = compiler.pass(device, "sort_bins", &definitions, &[Some(&own.sort_bins)])?;
-            self.sort_bins[lists as usize].get_or_init(|| made);
+            self.sort_bins[usize::from(variant.counted)][variant.lists as usize].get_or_init(|| made);
         }
         if self.blend_blocks(variant).is_none() {
             let definitions = [&variant.blend_definitions(), compiler.subgroups].concat();
@@ -91,9 +98,14 @@ impl BinPasses {
         self.colors[self.compiler.copied(batched)][storage as usize].get()
     }
 
-    /// Returns `sort_bins` for lists of this length, if it has been compiled.
-    pub(super) fn sort_bins(&self, lists: Lists) -> Option<&wgpu::ComputePipeline> {
-        self.sort_bins[lists as usize].get()
+    /// Returns `place_bins` and `fill_bins`, if they have been compiled.
+    pub(super) fn counted(&self) -> Option<&[wgpu::ComputePipeline; 2]> {
+        self.counted.get()
+    }
+
+    /// Returns `sort_bins`, if it has been compiled.
+    pub(super) fn sort_bins(&self, variant: BinVariant) -> Option<&wgpu::ComputePipeline> {
+        self.sort_bins[usize::from(variant.counted)][variant.lists as usize].get()
     }
 
     /// Returns `blend_blocks`, if it has been compiled.
@@ -110,6 +122,7 @@ impl BinPasses {
         let reads = |(storage, batched)| {
             self.project_bin(storage, batched, variant).is_some() && self.colors(storage, batched).is_some()
         };
-        self.sort_bins(variant.lists).is_some() && self.blend_blocks(variant).is_some() && drawn.all(reads)
+        let fills = !variant.counted || self.counted().is_some();
+        fills && self.sort_bins(variant).is_some() && self.blend_blocks(variant).is_some() && drawn.all(reads)
     }
 }

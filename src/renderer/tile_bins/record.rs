@@ -23,8 +23,8 @@ fn colors_of_group(storage: Storage) -> u32 {
     }
 }
 
-/// The largest number of workgroups of `colors`, which loop over the visible splats: enough to occupy any GPU.
-const COLOR_GROUPS: u32 = 8192;
+/// The largest number of workgroups of `colors` and of `fill_bins`, which loop over the visible splats: enough to occupy any GPU.
+const MOST_GROUPS: u32 = 8192;
 
 impl BinBuffers {
     /// Clears what the passes of earlier frames have not cleared, before the compute pass of a frame with so many slots.
@@ -51,12 +51,13 @@ impl BinBuffers {
         }
     }
 
-    /// Records the passes of a frame. `has_colors`: whether colors of splats are computed.
+    /// Records the passes of a frame of so many slots. `has_colors`: whether colors of splats are computed.
     pub(in crate::renderer) fn record(
         &self,
         frame: &Recording<'_>,
         pass: &mut wgpu::ComputePass<'_>,
         state: &BinState,
+        slots: u32,
         has_colors: bool,
     ) {
         let passes = &frame.renderer.passes.tile_bins;
@@ -65,11 +66,21 @@ impl BinBuffers {
         let pipeline = |storage, batched| passes.project_bin(storage, batched, state.variant);
         let groups = |_, count: u32| count.div_ceil(256 * per_thread(count));
         frame.dispatch_parts(pass, pipeline, &self.project_bin[parity], groups);
+
+        // place_bins, fill_bins
+        if state.variant.counted {
+            let Some([place_bins, fill_bins]) = passes.counted() else { return };
+            pass.set_bind_group(0, &self.fill_bins[parity], &[]);
+            pass.set_pipeline(place_bins);
+            pass.dispatch_workgroups(1, 1, 1);
+            pass.set_pipeline(fill_bins);
+            pass.dispatch_workgroups(slots.div_ceil(256).min(MOST_GROUPS), 1, 1);
+        }
         frame.mark(pass);
 
         // sort_bins
         let (Some(sort_bins), Some(blend_blocks)) =
-            (passes.sort_bins(state.variant.lists), passes.blend_blocks(state.variant))
+            (passes.sort_bins(state.variant), passes.blend_blocks(state.variant))
         else {
             return;
         };
@@ -82,7 +93,7 @@ impl BinBuffers {
         // colors
         if has_colors {
             let pipeline = |storage, batched| passes.colors(storage, batched);
-            let groups = |storage, count: u32| count.div_ceil(colors_of_group(storage)).min(COLOR_GROUPS);
+            let groups = |storage, count: u32| count.div_ceil(colors_of_group(storage)).min(MOST_GROUPS);
             frame.dispatch_parts(pass, pipeline, &self.colors[parity], groups);
         }
         frame.mark(pass);

@@ -5,6 +5,7 @@
 
 use super::bins::{bin_grid, stamp};
 use super::variant::BinVariant;
+use crate::renderer::layout::Counters;
 use crate::renderer::view::Sizes;
 use glam::UVec2;
 
@@ -58,14 +59,51 @@ impl BinState {
 
     /// Returns the uniform `binning` of a part in a picture.
     pub(in crate::renderer) fn uniform(&self, sizes: &Sizes, picture: UVec2, part: u32) -> [u32; 4] {
-        [self.side | (stamp(self.frames) << 8), sizes.entries / self.count(picture), part, sizes.parts]
+        [self.side | (stamp(self.frames) << 8), self.capacity(sizes, picture), part, sizes.parts]
+    }
+
+    /// Returns the capacity of each bin of a picture; 0 if bins are counted before they are filled.
+    fn capacity(&self, sizes: &Sizes, picture: UVec2) -> u32 {
+        if self.variant.counted { 0 } else { sizes.entries / self.count(picture) }
+    }
+
+    /// Returns whether bins must be counted before they are filled, because room for the same number of splats in each would be more than
+    /// `most` entries. `guess` is the number of these entries before splats have been counted.
+    pub(in crate::renderer) fn must_count(&self, guess: u32, most: u32) -> bool {
+        most < if self.room.is_known { self.room.wanted } else { guess }
+    }
+
+    /// Returns the number of entries of all bins of a view of so many pairs. `guess` and `most` are those of [`must_count`](Self::must_count).
+    pub(in crate::renderer) fn entries(&self, guess: u32, most: u32, pairs: u32) -> u32 {
+        // Each entry has at least one pair.
+        if self.variant.counted { pairs } else { self.room.wanted.max(guess).min(most) }
+    }
+
+    /// Returns whether some entries or pairs of a frame with these counts may have no room.
+    pub(in crate::renderer) fn lacks_room(&self, sizes: &Sizes, picture: UVec2, counters: &Counters) -> bool {
+        let fullest = counters.pairs_wanted;
+        let too_many = if self.variant.counted {
+            fullest.saturating_mul(self.count(picture)).min(counters.pairs) > sizes.entries.min(sizes.ordered)
+        } else {
+            fullest > self.capacity(sizes, picture)
+        };
+        too_many || counters.pairs > sizes.pairs
+    }
+
+    /// Processes the counters of a frame of a picture that was drawn with these sizes.
+    pub(in crate::renderer) fn note(&mut self, sizes: &Sizes, picture: UVec2, counters: &Counters) {
+        let capacity = if self.variant.counted { 0 } else { sizes.entries };
+        self.room.note(counters.pairs_wanted.saturating_mul(self.count(picture)), capacity);
     }
 }
 
-/// The wanted capacity of all bins together, in splats: the number of bins times the number of splats in the fullest bin, and a reserve.
+/// The wanted capacity of all bins together with equal rooms, in splats: the number of bins times the number of splats in the fullest bin, and
+/// a reserve.
 #[derive(Debug, Default)]
 pub(in crate::renderer) struct BinRoom {
     wanted: u32,
+    /// Whether splats have been counted.
+    is_known: bool,
     /// The largest capacity that a frame has needed since the last reset, and the number of frames since then.
     peak: u32,
     frames: u32,
@@ -77,19 +115,15 @@ const FRAMES_OF_PEAK: u32 = 1200;
 const MUCH: u32 = 4;
 
 impl BinRoom {
-    /// Creates the capacity with this initial number of wanted splats.
-    pub(in crate::renderer) fn of(wanted: u32) -> Self {
-        Self { wanted, ..Self::default() }
+    /// Returns the wanted capacity of another view, or `capacity` if that is larger.
+    pub(in crate::renderer) fn of(other: &Self, capacity: u32) -> Self {
+        Self { wanted: other.wanted.max(capacity), is_known: other.is_known, ..Self::default() }
     }
 
-    /// Returns the wanted capacity in splats.
-    pub(in crate::renderer) fn wanted(&self) -> u32 {
-        self.wanted
-    }
-
-    /// Processes the capacity that a frame needed, and the `capacity` that it had. A frame that exceeds its capacity is slow: the wanted
-    /// capacity grows before it is exceeded, and is reduced only after many frames that did not need it.
-    pub(in crate::renderer) fn note(&mut self, needed: u32, capacity: u32) {
+    /// Processes the capacity that a frame needed, and the `capacity` that it had, 0 if bins were counted. A frame that exceeds its capacity is
+    /// slow: the wanted capacity grows before it is exceeded, and is reduced only after many frames that did not need it.
+    fn note(&mut self, needed: u32, capacity: u32) {
+        self.is_known = true;
         let with_reserve = |needed: u32| needed.saturating_add(needed / 2);
         if needed > capacity / 4 * 3 {
             self.wanted = self.wanted.max(with_reserve(needed));
@@ -110,21 +144,43 @@ mod tests {
     use super::*;
 
     #[test]
+    fn bins_are_counted_if_equal_rooms_would_be_too_large() {
+        let (picture, guess) = (UVec2::new(3840, 2160), 5000);
+        let mut bins = BinState { side: 4, ..BinState::default() };
+        assert!(bins.must_count(guess, 4999), "nothing is known yet: the guess decides");
+        assert!(!bins.must_count(guess, 5000), "the guess fits");
+        let counters = Counters { visible: 300, pairs: 700, pairs_wanted: 100, padding: 0 };
+        let sizes = Sizes { pairs: 700, entries: 5000, ordered: 700, ..Sizes::default() };
+        bins.note(&sizes, picture, &counters);
+        let needed = bins.count(picture) * 100;
+        assert!(bins.must_count(guess, needed), "the fullest bin is known, and needs a reserve of one half");
+        assert!(!bins.must_count(guess, needed + needed / 2), "equal rooms with their reserve fit");
+        assert_eq!(bins.entries(guess, 2 * needed, 700), needed + needed / 2, "equal rooms");
+        assert!(bins.lacks_room(&sizes, picture, &counters), "the fullest bin has no room");
+        bins.variant.counted = true;
+        assert_eq!(bins.entries(guess, needed, 700), 700, "an entry for each pair");
+        assert_eq!(bins.uniform(&sizes, picture, 0)[1], 0, "the bins have no capacity each");
+        assert!(!bins.lacks_room(&sizes, picture, &counters), "all entries have room");
+        let few = Sizes { ordered: 699, ..sizes };
+        assert!(bins.lacks_room(&few, picture, &counters), "there may be as many entries as pairs");
+    }
+
+    #[test]
     fn capacity_grows_before_it_is_exceeded() {
         let mut room = BinRoom::default();
         room.note(700, 1000);
-        assert_eq!(room.wanted(), 0, "70 % of the capacity does not grow it");
+        assert_eq!(room.wanted, 0, "70 % of the capacity does not grow it");
         room.note(800, 1000);
-        assert_eq!(room.wanted(), 1200, "80 % of the capacity grows it to 1.5 times the need");
+        assert_eq!(room.wanted, 1200, "80 % of the capacity grows it to 1.5 times the need");
     }
 
     #[test]
     fn alternating_views_keep_the_capacity_of_the_fullest_view() {
         let mut room = BinRoom::default();
         for frame in 0..10 * FRAMES_OF_PEAK {
-            room.note(if frame % 60 == 0 { 9000 } else { 10 }, room.wanted().max(1000));
+            room.note(if frame % 60 == 0 { 9000 } else { 10 }, room.wanted.max(1000));
         }
-        assert_eq!(room.wanted(), 13_500, "every sixtieth frame needs this capacity");
+        assert_eq!(room.wanted, 13_500, "every sixtieth frame needs this capacity");
     }
 
     #[test]
@@ -132,8 +188,8 @@ mod tests {
         let mut room = BinRoom::default();
         room.note(9000, 1000);
         for _ in 0..2 * FRAMES_OF_PEAK {
-            room.note(100, room.wanted());
+            room.note(100, room.wanted);
         }
-        assert_eq!(room.wanted(), 150, "the need and a reserve of one half");
+        assert_eq!(room.wanted, 150, "the need and a reserve of one half");
     }
 }

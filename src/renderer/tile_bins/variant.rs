@@ -114,6 +114,9 @@ impl Blending {
     }
 }
 
+/// The definition of `sort_bins` for bins that are counted before they are filled.
+pub const COUNTED: &[&str] = &["COUNTED"];
+
 /// Definitions of `project_bin` for at most 512 bins.
 pub const FEW_BINS: &[&str] = &["FEW_BINS"];
 
@@ -124,6 +127,8 @@ pub(super) const FEW_BINS_LIMIT: u32 = 512;
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(in crate::renderer) struct BinVariant {
     pub few_bins: bool,
+    /// Whether bins are counted before they are filled, and have exact room, in place of room for the same number of splats.
+    pub counted: bool,
     pub lists: Lists,
     pub blending: Blending,
     pub precision: ColorPrecision,
@@ -139,6 +144,11 @@ impl BinVariant {
         (self.blending as usize * 2 + self.precision as usize) * 2 + usize::from(self.large_batches)
     }
 
+    /// Returns the definitions of `sort_bins`.
+    pub(in crate::renderer) fn sort_definitions(self) -> Vec<&'static str> {
+        [self.lists.definitions(), if self.counted { COUNTED } else { &[] }].concat()
+    }
+
     /// Returns the definitions of `blend_blocks`.
     pub(in crate::renderer) fn blend_definitions(self) -> Vec<&'static str> {
         let batches = match self.blending {
@@ -150,13 +160,15 @@ impl BinVariant {
     }
 
     /// Returns the other variants that draw the same picture, perhaps not as fast: with lists of other lengths, counters for any number of bins,
-    /// batches of another size.
+    /// batches of another size, bins that are counted first or not.
     pub(in crate::renderer) fn substitutes(self) -> impl Iterator<Item = Self> {
         let bins = if self.few_bins { &[true, false][..] } else { &[false] };
         let lists = [self.lists].into_iter().chain(Lists::ALL);
         let batches = [self.large_batches, !self.large_batches];
+        let counted = [self.counted, !self.counted];
         lists
             .flat_map(move |lists| batches.map(|large_batches| Self { lists, large_batches, ..self }))
+            .flat_map(move |variant| counted.map(|counted| Self { counted, ..variant }))
             .flat_map(move |variant| bins.iter().map(move |&few_bins| Self { few_bins, ..variant }))
     }
 

@@ -31,10 +31,9 @@ impl ViewRenderer {
     pub(in crate::renderer) fn must_draw_again(&mut self, renderer: &Renderer, counters: &Counters) -> bool {
         let made = self.resources.as_ref().filter(|made| matches!(made.buffers, DesignBuffers::TileBins(_)));
         let Some(made) = made.filter(|_| renderer.is_software).map(|made| made.sizes) else { return false };
-        let fullest = counters.pairs_wanted;
-        let searches = fullest > made.entries / self.bins.count(self.picture) || counters.pairs > made.pairs;
-        self.crowded =
-            !tile_bins::is_complete(Crowd { slots: self.slots, fullest, searches, lists: self.bins.variant.lists });
+        let (slots, fullest, lists) = (self.slots, counters.pairs_wanted, self.bins.variant.lists);
+        let searches = self.bins.lacks_room(&made, self.picture, counters);
+        self.crowded = !tile_bins::is_complete(Crowd { slots, fullest, searches, lists });
         self.crowded
     }
 

@@ -62,27 +62,40 @@ impl ViewRenderer {
     ) -> Result<(), GpuError> {
         self.poll();
         // The maximum over time, so that another segment of a filter does not change the buffers.
-        let slots: usize = instances.iter().map(|instance| most_drawn(instance.capture, instance.active)).sum();
-        self.choose_design(device, renderer, slots);
+        let at_most: usize = instances.iter().map(|instance| most_drawn(instance.capture, instance.active)).sum();
+        self.choose_design(device, renderer, at_most);
         let (precision, blending) = (parameters.precision, parameters.blending());
         let picture = instances.first().map_or(self.picture, |instance| instance.view.size);
         let total: usize = instances.iter().map(|instance| instance.capture.len()).sum();
         let total = u32::try_from(total).unwrap_or(u32::MAX);
+        let limits = device.limits();
+        require_texture(picture, &limits)?;
+        check_slots(&limits, self.design, at_most)?;
+        let slots = at_most as u32;
+        // A first guess; the counters of later frames correct it.
+        let guess = total.saturating_mul(2).min(slots.saturating_mul(6)).max(1 << 16);
+        let most = max_pairs(device);
+        let pairs = self.pairs_wanted.max(guess).min(most);
+        let side = tile_bins::bin_side(picture, total);
+        // An entry has twice as many bytes as a pair.
+        let equal_rooms = tile_bins::equal_rooms(pairs).min(most / 2);
+        let first_entries = |picture| tile_bins::first_guess(picture, side, slots);
         self.pixels = Pixels { multisampled: blending.is_multisampled(), precision };
         self.has_depths = parameters.depths;
         let joined = instances.chunk_by(Instance::joins);
         let drawn = joined.map(|joined| (joined[0].capture.storage, joined.len() > 1));
         let writes_depths = if self.design == Design::GlobalSort {
             if renderer.is_software {
-                self.at_once = global_sort::at_once(slots).ok_or(GpuError::TooManySplats { slots })?;
+                self.at_once = global_sort::at_once(at_most).ok_or(GpuError::TooManySplats { slots: at_most })?;
             }
             renderer.passes.global_sort.compile(device, drawn, self.pixels, self.at_once)?;
             true
         } else {
-            let large_batches = tile_bins::large_batches(&device.limits(), instances);
-            let lists = Lists::suiting(&device.limits(), self.bins.fullest);
-            let few_bins = tile_bins::few_bins(picture, tile_bins::bin_side(picture, total), total);
-            let wanted = BinVariant { few_bins, lists, blending, precision, large_batches };
+            let large_batches = tile_bins::large_batches(&limits, instances);
+            let lists = Lists::suiting(&limits, self.bins.fullest);
+            let few_bins = tile_bins::few_bins(picture, side, total);
+            let counted = self.bins.must_count(first_entries(picture), equal_rooms);
+            let wanted = BinVariant { few_bins, counted, lists, blending, precision, large_batches };
             self.bins.variant = renderer.bin_variant(device, drawn, wanted)?;
             blending.writes_depths()
         };
@@ -91,29 +104,21 @@ impl ViewRenderer {
             self.bins.frames = self.bins.frames.wrapping_add(1);
         }
         let made = self.resources.as_ref().map(|resources| resources.sizes).unwrap_or_default();
-        let limits = device.limits();
-        require_texture(picture, &limits)?;
         let parts: usize = instances.iter().map(|instance| instance.capture.parts.len()).sum();
-        check_slots(&limits, self.design, slots)?;
-        let slots = slots as u32;
-        // A first guess; the counters of later frames correct it.
-        let guess = total.saturating_mul(2).min(slots.saturating_mul(6)).max(1 << 16);
-        let most = max_pairs(device);
-        let pairs = self.pairs_wanted.max(guess).min(most);
-        (self.picture, self.bins.side) = (picture, tile_bins::bin_side(picture, total));
+        (self.picture, self.bins.side) = (picture, side);
         let in_bins = self.bins.fullest.saturating_mul(self.bins.count(picture));
-        self.short_of_room = self.statistics.pairs > most || in_bins > most / 2;
+        self.short_of_room = self.statistics.pairs > most || in_bins.min(self.statistics.pairs) > most / 2;
         let entries = |picture| match self.design {
             Design::GlobalSort => 0,
-            // An entry has twice as many bytes as a pair.
             Design::Auto | Design::TileBins => {
-                self.bins.room.wanted().max(tile_bins::first_guess(picture, self.bins.side, slots)).min(most / 2)
+                self.bins.entries(first_entries(picture), equal_rooms, pairs).min(most / 2)
             }
         };
         let needed = |picture| Sizes {
             slots: slots.next_multiple_of(BLOCK).max(BLOCK),
             pairs,
             entries: entries(picture),
+            ordered: if self.bins.variant.counted { entries(picture) } else { 0 },
             parts: (parts as u32).max(1),
             picture,
             depths: if writes_depths { picture } else { UVec2::ONE },
@@ -198,6 +203,7 @@ impl ViewRenderer {
         let oversized = made.slots / OVERSIZE_FACTOR > exact.slots
             || made.pairs / OVERSIZE_FACTOR > guess.max(counted)
             || made.entries / OVERSIZE_FACTOR > exact.entries
+            || made.ordered / OVERSIZE_FACTOR > exact.ordered
             || made.picture.element_product() / OVERSIZE_FACTOR > exact.picture.element_product();
         self.oversized_frames = if oversized { self.oversized_frames + 1 } else { 0 };
         if self.oversized_frames > RELEASE_AFTER_IDLE_FRAMES {
@@ -209,6 +215,7 @@ impl ViewRenderer {
             slots: made.slots.max(grown.slots),
             pairs: made.pairs.max(grown.pairs),
             entries: made.entries.max(grown.entries),
+            ordered: made.ordered.max(grown.ordered),
             parts: made.parts.max(grown.parts),
             picture: grown.picture,
             depths: grown.depths,

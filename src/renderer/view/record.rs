@@ -42,7 +42,9 @@ impl ViewRenderer {
         });
         let frame = Recording { renderer, instances, picture: self.picture, pixel: &made.pixel, timer };
         match &made.buffers {
-            DesignBuffers::TileBins(buffers) => buffers.record(&frame, &mut pass, &self.bins, self.has_colors),
+            DesignBuffers::TileBins(buffers) => {
+                buffers.record(&frame, &mut pass, &self.bins, self.slots, self.has_colors);
+            }
             DesignBuffers::GlobalSort(buffers) => {
                 buffers.record(&frame, &mut pass, self.slots, self.pixels, self.at_once);
             }

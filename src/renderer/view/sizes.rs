@@ -13,6 +13,8 @@ pub(in crate::renderer) struct Sizes {
     pub pairs: u32,
     /// Entries of all tile bins together; 0 for the global sort.
     pub entries: u32,
+    /// Room for entries that are ordered before they are sorted, if bins are counted; otherwise 0.
+    pub ordered: u32,
     /// Number of instance uniforms.
     pub parts: u32,
     /// Size of the largest picture, pixels.

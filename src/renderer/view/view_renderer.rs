@@ -192,7 +192,7 @@ impl ViewRenderer {
             self.pairs_wanted = pairs.saturating_add(pairs / 2);
         }
         if self.design == Design::TileBins {
-            self.bins.room.note(counters.pairs_wanted.saturating_mul(self.bins.count(self.picture)), made.entries);
+            self.bins.note(&made, self.picture, counters);
         }
     }
 
@@ -201,7 +201,8 @@ impl ViewRenderer {
     pub(crate) fn make_room_of(&mut self, other: &Self) {
         let made = other.resources.as_ref().map(|made| made.sizes).unwrap_or_default();
         self.pairs_wanted = other.pairs_wanted.max(made.pairs);
-        self.bins.room = BinRoom::of(other.bins.room.wanted().max(made.entries));
+        let entries = if other.bins.variant.counted { 0 } else { made.entries };
+        self.bins.room = BinRoom::of(&other.bins.room, entries);
     }
 
     /// Returns the capacity in pairs.
