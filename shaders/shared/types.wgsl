@@ -203,5 +203,5 @@ const SORT_VISIBLE: u32 = 1u;
 const SORT_PAIRS: u32 = 2u;
 
 // Number of counters of tile bins before the counters of parts and bins: pairs of this frame, modulo 2^32, and how often this number
-// has wrapped; then visible splats, pairs, splats of the fullest bin and pairs written of the previous frame.
+// has wrapped; then visible splats, pairs, splats of the fullest bin and pairs for which room was asked of the previous frame.
 const BIN_COUNTERS: u32 = 6u;

@@ -402,18 +402,15 @@ fn pairs_before(own: vec4<u32>, thread: u32) -> array<vec4<u32>, 2> {
     return before;
 }
 
-// Reserves room for pairs. Returns the first pair; NONE if there is too little room. The number of pairs written never exceeds the capacity,
-// so that it does not wrap.
+// Reserves room for pairs. Returns the first pair; NONE if there is too little room. The counter cannot wrap: `project_bin` has counted the
+// pairs of the frame, and none are written if they are 2^32 or more. A loop of compare and exchange makes all bins wait for one another.
 fn reserve_pairs(count: u32) -> u32 {
-    var written = atomicLoad(&next_bins[5]);
-    while count <= frame.pair_capacity - written {
-        let exchange = atomicCompareExchangeWeak(&next_bins[5], written, written + count);
-        if exchange.exchanged {
-            return written;
-        }
-        written = exchange.old_value;
+    if bins[1] > 0u {
+        return NONE.x;
     }
-    return NONE.x;
+    let first = atomicAdd(&next_bins[5], count);
+    let fits = count <= frame.pair_capacity && first <= frame.pair_capacity - count;
+    return select(NONE.x, first, fits);
 }
 
 // Reserves room for `counted` pairs of each tile of the bin with the first tile `corner`, and writes their ranges.

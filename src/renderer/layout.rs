@@ -369,5 +369,5 @@ pub const SORT_VISIBLE: u32 = 1;
 pub const SORT_PAIRS: u32 = 2;
 
 /// Number of counters of tile bins before the counters of parts and bins: pairs of this frame, modulo 2³², and how often this number
-/// has wrapped; then the [`Counters`] of the previous frame, the last of which is the number of pairs written.
+/// has wrapped; then the [`Counters`] of the previous frame, the last of which is the number of pairs for which room was asked.
 pub const BIN_COUNTERS: u32 = 6;
