@@ -197,6 +197,7 @@ pub mod offline {
         pub use crate::offline::fine_tune::adam::*;
         pub use crate::offline::fine_tune::dropout::*;
         pub use crate::offline::fine_tune::environment_backward::*;
+        pub use crate::offline::fine_tune::exposure::*;
         pub use crate::offline::fine_tune::loss::*;
         pub use crate::offline::fine_tune::neighbors::*;
         pub use crate::offline::fine_tune::noise::*;

@@ -5,6 +5,7 @@
 
 use super::args::{Given, PackageArgs, RendererArgs, SplitArgs, TrainingArgs, WITHOUT_TIME, values};
 use super::curve::curve_table;
+use super::exposures::exposure_row;
 use super::failure::Failure;
 use super::interrupt;
 use super::progress::Bars;
@@ -29,6 +30,7 @@ use serde_json::json;
 Examples:
   gs4d train --data data/hook --resolution 2 -o hook.gs4d
   gs4d train --data data/hook --resolution 2 --gaussians 30000 --steps 10000 -o small.gs4d
+  gs4d train --data data/cameras --exposure -o even.gs4d     # cameras of different exposure or white balance
 
 The result is as large as a checkpoint: gs4d bake prunes and compresses it.")]
 pub(super) struct Train {
@@ -149,7 +151,7 @@ impl Train {
         if !interrupted {
             store.remove()?;
         }
-        let FineTuned { scene, curve, best, steps_per_second, validation, faults } = tuned;
+        let FineTuned { scene, curve, best, steps_per_second, validation, faults, exposures } = tuned;
         let quality = match best.psnr {
             Some(psnr) => format!("{psnr:.3} dB at step {} ({validation} validation views)", best.step),
             None => "not measured, no validation views".to_owned(),
@@ -165,6 +167,7 @@ impl Train {
             ("PSNR", quality),
             ("wrote", format!("{}, {}", out.display(), bytes(size))),
         ];
+        pairs.extend(exposure_row(tuned));
         if interrupted {
             pairs.push(("interrupted", "wrote the best parameters so far; the same command resumes".to_owned()));
         }
@@ -184,6 +187,7 @@ impl Train {
             "best": best,
             "psnr": best.psnr,
             "curve": curve,
+            "exposures": exposures,
             "steps_per_second": steps_per_second,
             "interrupted": interrupted,
             "gradients_left_out": faults.map_or(0, |faults| faults.count),

@@ -22,6 +22,7 @@ const PASSES: &[(&str, &str)] = &[
     ("loss", include_str!("../../shaders/offline/loss.wgsl")),
     ("blend_backward", include_str!("../../shaders/offline/blend_backward.wgsl")),
     ("environment_backward", include_str!("../../shaders/offline/environment_backward.wgsl")),
+    ("exposure", include_str!("../../shaders/offline/exposure.wgsl")),
     ("project_backward", include_str!("../../shaders/offline/project_backward.wgsl")),
     ("regularize", include_str!("../../shaders/offline/regularize.wgsl")),
     ("codebooks", include_str!("../../shaders/offline/codebooks.wgsl")),

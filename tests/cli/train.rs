@@ -50,6 +50,21 @@ fn a_capture_is_trained_from_the_pictures_of_a_dataset() {
     gs4d(&arguments!["eval", &out, "--data", &capture.data, "--metrics", "psnr", "--json"]).json();
 }
 
+#[test]
+fn exposures_are_reported_and_not_stored() {
+    let Some(capture) = dataset() else { return };
+    let out = capture.path("out.gs4d");
+    let command = arguments!["train", "--data", &capture.data, "-o", &out, "--gaussians", "100", "--sh-degree", "0"];
+    let short = ["--steps", "20", "--validation", "none", "--exposure"].map(Into::into);
+    let command = [command.to_vec(), short.to_vec()].concat();
+    let text = gs4d(&command).text();
+    assert!(text.contains("of 4 cameras, gains "), "one for each training camera: {text}");
+    let json = gs4d(&[command, vec!["--json".into()]].concat()).json();
+    let exposures = json["exposures"].as_array().expect("a list");
+    let rows = exposures.iter().map(|exposure| exposure.as_array().map_or(0, Vec::len));
+    assert_eq!(rows.collect::<Vec<_>>(), [3; 4], "three rows each: {json}");
+}
+
 #[cfg(unix)]
 #[test]
 fn an_interrupted_run_has_written_the_best_parameters() {

@@ -7,6 +7,7 @@
 use crate::support::blob::blob;
 use crate::support::{dataset, gpu};
 use bevy_gs4d::gaussian::{Gaussian, GradientMode, Harmonics, Parameters};
+use bevy_gs4d::internal::offline::dataset::selection::camera_numbers;
 use bevy_gs4d::internal::offline::fine_tune::{
     Sample, StepGrowth, Terms, Trainer, TrainerState, is_dropped, neighbors, noise, regularization, relocate,
 };
@@ -274,7 +275,7 @@ impl Lesson {
         let splits = Splits::open(&data, &SplitOptions::default(), &scene.trained_with, &mut NoProgress);
         let splits = splits.expect("the dataset was just written");
         let all = splits.all_training(&scene.trained_with, &mut NoProgress).expect("the dataset was just written");
-        all.iter().for_each(|view| write_covered(&scene, view, &view.image));
+        all.iter().for_each(|view| write_covered(&scene, view, 1.0, &view.image));
         Self { folder, all, splits }
     }
 
@@ -302,15 +303,15 @@ impl Lesson {
     }
 }
 
-/// Writes the image of a view with its coverage.
-fn write_covered(scene: &RuntimeScene, view: &TrainingView, path: &Path) {
+/// Writes the image of a view with its coverage, as a camera of this gain takes it.
+fn write_covered(scene: &RuntimeScene, view: &TrainingView, gain: f32, path: &Path) {
     let to_draw = view.camera.view(view.time, RasterFov::Corrected);
     let frame = reference::render(scene, &to_draw, Background::None);
     let mut image = image::RgbaImage::new(view.camera.size.x, view.camera.size.y);
     let pixels = image.pixels_mut().zip(frame.picture.pixels.iter().zip(&frame.transmittance));
     for (pixel, (color, transmittance)) in pixels {
         let coverage = 1.0 - transmittance;
-        let [r, g, b] = (*color / coverage.max(1e-3)).to_array();
+        let [r, g, b] = (*color * gain / coverage.max(1e-3)).to_array();
         pixel.0 = [r, g, b, coverage].map(|value| (value.clamp(0.0, 1.0) * 255.0).round() as u8);
     }
     image.save(path).expect("the folder can be written to");
@@ -344,6 +345,39 @@ fn a_capture_is_trained_from_nothing() {
         let written = bevy_gs4d::codec::load(&out, &Default::default()).expect("the package of an evaluation is whole");
         assert_eq!(written.len(), 400, "{start:?}: the package has all Gaussians");
         std::fs::remove_file(&out).expect("the package was written");
+    }
+}
+
+#[test]
+fn exposures_even_out_cameras_that_differ() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let lesson = Lesson::new();
+    // Three cameras of nine see half the light; the camera held out has the mean gain, which is far from what most have.
+    let gain = |camera: u32| [0.5, 1.0, 1.0][camera as usize % 3];
+    const MEAN: f32 = 7.5 / 9.0;
+    let cameras = camera_numbers(&lesson.splits.train);
+    for (view, &camera) in lesson.splits.train.iter().zip(&cameras) {
+        write_covered(&blobs(), view, gain(camera), &view.image);
+    }
+    lesson.splits.validation.iter().for_each(|view| write_covered(&blobs(), view, MEAN, &view.image));
+    let start = StartSettings { gaussians: 300, degree: 0, ..StartSettings::default() };
+    let mut train = |exposure: bool| {
+        // Of few steps.
+        let rates = Rates { exposure: 5e-3, ..settings(300).rates };
+        let settings = FineTuneSettings { exposure, rates, ..settings(300) };
+        lesson.train(&mut headless, &start, &settings, None, None, &mut NoProgress).expect("the capture is trained")
+    };
+    let (without, with) = (train(false), train(true));
+    let [before, after] = [&without, &with].map(|tuned| tuned.best.psnr.expect("validation views"));
+    println!("validation: {before:.2} dB without exposures, {after:.2} dB with them");
+    assert!(after > before + 1.0, "exposures raise the PSNR of the camera held out: {before:.2} to {after:.2} dB");
+    assert_eq!((without.exposures.len(), with.exposures.len()), (0, 9), "each training camera has one");
+    for (camera, exposure) in with.exposures.iter().enumerate() {
+        // On a gray of 0.5, in the mean of the channels.
+        let found = exposure.iter().map(|[r, g, b, offset]| r + g + b + 2.0 * offset).sum::<f32>() / 3.0;
+        let expected = gain(camera as u32) / MEAN;
+        println!("camera {camera}: {found:.2}, expected {expected:.2}");
+        assert!((found - expected).abs() < 0.2, "camera {camera}: a gain of {found:.2}, {expected:.2} expected");
     }
 }
 
@@ -381,8 +415,12 @@ fn training_from_nothing_repeats_and_resumes_at_the_same_bytes() {
     let growth =
         Growth { relocate_every: Some(10), relocate_from: 0, relocate_until: 60, raise_every: 8, ..Growth::over(60) };
     // Opacities fall fast, so that Gaussians fade within these steps.
-    let settings =
-        FineTuneSettings { rates: Rates { opacity: 0.5, ..Rates::OURS }, growth: Some(growth), ..settings(60) };
+    let settings = FineTuneSettings {
+        rates: Rates { opacity: 0.5, ..Rates::OURS },
+        growth: Some(growth),
+        exposure: true,
+        ..settings(60)
+    };
     let mut run = |store: Option<&Store>, progress: &mut dyn Progress| {
         lesson.train(&mut headless, &start, &settings, store, None, progress)
     };
@@ -399,6 +437,7 @@ fn training_from_nothing_repeats_and_resumes_at_the_same_bytes() {
         );
         let resumed = run(Some(&store), &mut NoProgress).expect("the capture is trained");
         assert!(resumed.scene == whole.scene, "after {left} steps: the resumed run has the same scene");
+        assert_eq!(resumed.exposures, whole.exposures, "after {left} steps: the resumed run has the same exposures");
         assert_eq!(resumed.curve, whole.curve, "after {left} steps: the resumed run has the same curve");
     }
     let other = lesson.train(

@@ -69,6 +69,9 @@ impl<'a> Run<'a> {
         let mut trainer = Trainer::with_sums(headless, scene, settings.mode, settings.sums)?;
         trainer.set_terms(settings.terms)?;
         trainer.set_sparse(settings.sparse);
+        if settings.exposure {
+            trainer.set_exposure(&images.cameras())?;
+        }
         if settings.growth.is_some() {
             trainer.set_growing()?;
         }
@@ -100,6 +103,7 @@ impl<'a> Run<'a> {
             steps_per_second: (steps > 0).then(|| steps as f64 / seconds),
             validation: self.images.validation.len(),
             faults: self.trainer.faults()?,
+            exposures: self.trainer.exposures()?,
         })
     }
 

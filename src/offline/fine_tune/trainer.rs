@@ -9,6 +9,7 @@
 //! | `rounding` | these records, what packing changes of each | the same, once geometry is [rounded](Trainer::round) |
 //! | the passes of the global sort | records, color | splats, pairs, picture |
 //! | `loss` | picture, image | gradients of pixels, sums |
+//! | `exposure` | picture, exposure of the camera | the picture that `loss` reads; gradients of pixels and exposures, if these are [trained](Trainer::set_exposure) |
 //! | `blend_backward` | splats, pairs, gradients of pixels | gradients of pairs |
 //! | `environment_backward` | gradients of pixels, transmittance | gradients of the environment map, if the scene has one |
 //! | `project_backward` | gradients of pairs, parameters | gradients of raw parameters, added up over a batch; which Gaussians were seen |
@@ -20,6 +21,7 @@
 //! | `codebooks` | gradients of coefficients; entries | gradients of entries; coefficients, once colors are [tied](Trainer::tie) |
 
 use super::backward::Backward;
+use super::exposure::Exposure;
 use super::grower::Grower;
 use super::optimized::{Extent, Optimized};
 use super::parameters::{ParameterBuffers, scene_settings};
@@ -35,6 +37,7 @@ use super::terms::Terms;
 use super::tied::Tied;
 use super::totals::{Faults, Totals};
 use super::trained_environment::TrainedEnvironment;
+use super::trained_exposure::TrainedExposure;
 use super::trainer_error::TrainerError;
 use crate::gaussian::harmonics::evaluated;
 use crate::gaussian::{GradientMode, Model};
@@ -75,6 +78,7 @@ pub struct Trainer<'a> {
     parameters: ParameterBuffers,
     backward: Backward,
     environment: Option<TrainedEnvironment>,
+    exposure: Option<TrainedExposure>,
     tied: Option<Tied>,
     /// Weight of the term of the mask.
     mask_weight: f32,
@@ -142,6 +146,7 @@ impl<'a> Trainer<'a> {
             parameters,
             backward,
             environment,
+            exposure: None,
             tied: None,
             mask_weight: 0.0,
             regularizer: None,
@@ -212,12 +217,39 @@ impl<'a> Trainer<'a> {
         Ok(())
     }
 
+    /// Trains an exposure for each camera from now on, which is the identity at first, and corrects by it what the loss sees of the views of
+    /// that camera. `cameras` has the camera of each view, numbered from 0. Exposures are not part of the scene, and [`draw`](Self::draw) does
+    /// not use them.
+    ///
+    /// # Errors
+    /// A shader that does not compile.
+    pub fn set_exposure(&mut self, cameras: &[u32]) -> Result<(), GpuError> {
+        self.exposure = Some(TrainedExposure::new(self.headless, &self.passes, &self.parameters.notes, cameras)?);
+        Ok(())
+    }
+
+    /// Returns the exposures of all cameras; none unless they are [trained](Self::set_exposure).
+    ///
+    /// # Errors
+    /// A lost device.
+    pub fn exposures(&self) -> Result<Vec<Exposure>, GpuError> {
+        self.exposure.as_ref().map_or(Ok(Vec::new()), |exposure| exposure.exposures(self.headless))
+    }
+
+    /// Returns the gradients with respect to the exposures, accumulated since the last step.
+    ///
+    /// # Errors
+    /// A lost device.
+    pub fn exposure_gradients(&self) -> Result<Vec<Exposure>, GpuError> {
+        self.exposure.as_ref().map_or(Ok(Vec::new()), |exposure| exposure.gradients(self.headless))
+    }
+
     /// Adds the gradients of the loss of a batch, each view with the same share.
     ///
     /// # Errors
     /// A picture or pairs that do not fit the GPU, an image of another size than its view.
     pub fn accumulate(&mut self, batch: &[Sample<'_>], similarity_share: f64) -> Result<(), GpuError> {
-        let Self { headless, passes, capture, parameters, backward, environment, mask_weight, .. } = self;
+        let Self { headless, passes, capture, parameters, backward, environment, exposure, mask_weight, .. } = self;
         let share = 1.0 / batch.len().max(1) as f32;
         for sample in batch {
             if sample.image.size != sample.view.size {
@@ -242,7 +274,15 @@ impl<'a> Trainer<'a> {
             };
             queue.write_buffer(&buffers.loss_settings, 0, bytemuck::bytes_of(&settings));
             parameters.write_scene(queue, sample.number);
-            buffers.record(&mut encoder, headless, passes, capture, parameters, Some(sample.image));
+            let correction = match exposure {
+                Some(exposure) => exposure.correction(headless, passes, buffers, sample, share)?,
+                None => None,
+            };
+            match correction {
+                Some(correction) => correction.record_loss(&mut encoder, passes, buffers, sample.image),
+                None => buffers.record_loss(&mut encoder, passes, sample.image),
+            }
+            buffers.record(&mut encoder, headless, passes, capture, parameters);
             if let Some(environment) = environment.as_ref().filter(|_| sample.background == Background::Environment) {
                 environment.record_scatter(&mut encoder, headless, &buffers.pixel_gradients, sample.view.size);
             }
@@ -270,7 +310,7 @@ impl<'a> Trainer<'a> {
         queue.write_buffer(&buffers.depth_gradients, 0, bytemuck::cast_slice(depths));
         parameters.write_scene(queue, 0);
         let mut encoder = encoder(headless, "gs4d view");
-        buffers.record(&mut encoder, headless, passes, capture, parameters, None);
+        buffers.record(&mut encoder, headless, passes, capture, parameters);
         if let Some(environment) = environment.as_ref().filter(|_| background == Background::Environment) {
             environment.record_scatter(&mut encoder, headless, &buffers.pixel_gradients, view.size);
         }
@@ -349,7 +389,7 @@ impl<'a> Trainer<'a> {
         step: usize,
         growth: Option<StepGrowth>,
     ) -> Result<(), GpuError> {
-        let Self { headless, passes, parameters, environment, tied, sparse, .. } = &*self;
+        let Self { headless, passes, parameters, environment, exposure, tied, sparse, .. } = &*self;
         let ParameterBuffers { geometry, color, .. } = parameters;
         let colors = rates.of_harmonics(factor);
         let spatial_lr_scale = self.scene.trained_with.spatial_lr_scale;
@@ -377,6 +417,9 @@ impl<'a> Trainer<'a> {
             }
             if let Some(environment) = environment {
                 environment.record_step(queue, &mut pass, passes, (rates.environment * factor) as f32, step);
+            }
+            if let Some(exposure) = exposure {
+                exposure.record_step(queue, &mut pass, passes, (rates.exposure * factor) as f32, step);
             }
             if let (Some(grower), Some(StepGrowth { noise, least_time_scale, seed, .. })) = (&self.grower, growth) {
                 let strength = (noise * rates.mean * spatial_lr_scale * factor) as f32;
@@ -565,7 +608,8 @@ impl<'a> Trainer<'a> {
     fn stored(&self) -> Vec<&wgpu::Buffer> {
         let ParameterBuffers { geometry, color, .. } = &self.parameters;
         let environment = self.environment.as_ref().map(|environment| &environment.values);
-        let all = [Some(geometry), Some(color), environment, self.tied.as_ref().map(|tied| &tied.entries)];
+        let exposure = self.exposure.as_ref().map(|exposure| &exposure.values);
+        let all = [Some(geometry), Some(color), environment, exposure, self.tied.as_ref().map(|tied| &tied.entries)];
         let optimized = all.into_iter().flatten().flat_map(Optimized::stored);
         optimized.chain(self.rounder.as_ref().map(|rounder| &rounder.changes)).collect()
     }
@@ -577,6 +621,9 @@ impl<'a> Trainer<'a> {
         self.parameters.color.forget_moments(&mut encoder);
         if let Some(environment) = &self.environment {
             environment.values.forget_moments(&mut encoder);
+        }
+        if let Some(exposure) = &self.exposure {
+            exposure.values.forget_moments(&mut encoder);
         }
         self.headless.context().queue.submit([encoder.finish()]);
     }
