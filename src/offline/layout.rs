@@ -181,6 +181,8 @@ pub struct RelocationUniforms {
     pub moves: u32,
     /// Four-vectors of the color of each Gaussian.
     pub stride: u32,
+    /// 1: Gaussians that others get their colors from keep their moments.
+    pub keeps: u32,
     /// Unused.
-    pub padding: [u32; 2],
+    pub padding: u32,
 }

@@ -29,6 +29,7 @@ const PASSES: &[(&str, &str)] = &[
     ("adam", include_str!("../../shaders/offline/adam.wgsl")),
     ("dropout", include_str!("../../shaders/offline/dropout.wgsl")),
     ("noise", include_str!("../../shaders/offline/noise.wgsl")),
+    ("statistics", include_str!("../../shaders/offline/statistics.wgsl")),
     ("relocate", include_str!("../../shaders/offline/relocate.wgsl")),
 ];
 

@@ -156,7 +156,7 @@ fn mirrors() -> [Mirror; 21] {
         mirror!(TermWeights { motion, rigid, opacity, scale }),
         mirror!(NoiseUniforms { count, seed, strength, least_log_scale_t }),
         mirror!(DropoutUniforms { count, seed, below, padding }),
-        mirror!(RelocationUniforms { moves, stride, padding }),
+        mirror!(RelocationUniforms { moves, stride, keeps, padding }),
     ]
 }
 
@@ -257,7 +257,7 @@ fn constant(module: &Module, name: &str) -> f64 {
 fn constants_of_the_passes_match_the_host() {
     let modules = modules();
     let threads = 256;
-    let expected: [(&str, &str, f64); 15] = [
+    let expected: [(&str, &str, f64); 16] = [
         ("activate", "BLOCK", BLOCK.into()),
         ("activate", "PER_THREAD", (BLOCK / threads).into()),
         ("sort", "BLOCK", BLOCK.into()),
@@ -270,6 +270,7 @@ fn constants_of_the_passes_match_the_host() {
         ("blend_backward", "PIXELS", (TILE_SIZE * TILE_SIZE).into()),
         ("project_backward", "FIRST_SEEN", FIRST_SEEN.into()),
         ("adam", "FIRST_SEEN", FIRST_SEEN.into()),
+        ("statistics", "FIRST_SEEN", FIRST_SEEN.into()),
         ("exposure", "SIDE", TILE_SIZE.into()),
         ("regularize", "NEIGHBORS", NEIGHBORS as f64),
         ("loss", "SIDE", TILE_SIZE.into()),

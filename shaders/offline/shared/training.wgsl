@@ -132,5 +132,7 @@ struct RelocationUniforms {
     moves: u32,
     // Four-vectors of the color of each Gaussian.
     stride: u32,
-    padding: vec2<u32>,
+    // 1: Gaussians that others get their colors from keep their moments.
+    keeps: u32,
+    padding: u32,
 }

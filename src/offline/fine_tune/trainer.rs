@@ -9,7 +9,7 @@
 //! | `rounding` | these records, what packing changes of each | the same, once geometry is [rounded](Trainer::round) |
 //! | the passes of the global sort | records, color | splats, pairs, picture |
 //! | `loss` | picture, image | gradients of pixels, sums |
-//! | `exposure` | picture, exposure of the camera | the picture that `loss` reads; gradients of pixels and exposures, if these are [trained](Trainer::set_exposure) |
+//! | `exposure` | picture, exposure of the camera | the picture that `loss` reads; gradients of exposures ([if trained](Trainer::set_exposure)) |
 //! | `blend_backward` | splats, pairs, gradients of pixels | gradients of pairs |
 //! | `environment_backward` | gradients of pixels, transmittance | gradients of the environment map, if the scene has one |
 //! | `project_backward` | gradients of pairs, parameters | gradients of raw parameters, added up over a batch; which Gaussians were seen |
@@ -17,10 +17,13 @@
 //! | `adam` | gradients, moments | parameters; of Gaussians that were seen only, if steps are [sparse](Trainer::set_sparse) |
 //! | `dropout` | the records of `slice` | the same, some without opacity, if Gaussians are [dropped](Trainer::drop_out) |
 //! | `noise` | raw parameters | the same with means moved at random and no too small temporal scale, if the scene [grows](Trainer::set_growing) |
+//! | `statistics` | views of a Gaussian, its gradients on the screen | sums over steps, if the scene [grows as the original](Trainer::set_cloning) |
 //! | `relocate` | moves, colors | colors of the Gaussians that move, moments, if the scene grows |
 //! | `codebooks` | gradients of coefficients; entries | gradients of entries; coefficients, once colors are [tied](Trainer::tie) |
 
 use super::backward::Backward;
+use super::cloner::{Cloner, CloningStep, reset, taken};
+use super::cloning::Densified;
 use super::exposure::Exposure;
 use super::grower::Grower;
 use super::optimized::{Extent, Optimized};
@@ -65,6 +68,8 @@ pub struct StepGrowth {
     pub least_time_scale: f64,
     /// Seed of the noise.
     pub seed: u32,
+    /// Whether gradients are added up, if the scene [grows as the original](Trainer::set_cloning).
+    pub adds_up: bool,
 }
 
 /// A scene that is trained.
@@ -85,6 +90,7 @@ pub struct Trainer<'a> {
     regularizer: Option<Regularizer>,
     rounder: Option<Rounder>,
     grower: Option<Grower>,
+    cloner: Option<Cloner>,
     sparse: bool,
     in_flight: VecDeque<wgpu::SubmissionIndex>,
 }
@@ -152,6 +158,7 @@ impl<'a> Trainer<'a> {
             regularizer: None,
             rounder: None,
             grower: None,
+            cloner: None,
             sparse: false,
             in_flight: VecDeque::new(),
         };
@@ -369,6 +376,58 @@ impl<'a> Trainer<'a> {
         Ok(moved)
     }
 
+    /// Compiles the pass of the densification of the original, for a scene that [grows](Self::set_growing): for [`densify`](Self::densify).
+    ///
+    /// # Errors
+    /// A shader that does not compile.
+    pub fn set_cloning(&mut self) -> Result<(), GpuError> {
+        self.cloner = Some(Cloner::new(self.headless, &self.parameters)?);
+        Ok(())
+    }
+
+    /// Removes, clones and splits Gaussians by their gradients in the steps since the last call. Nothing is done unless the scene
+    /// [grows as the original](Self::set_cloning).
+    ///
+    /// # Errors
+    /// A lost device.
+    pub fn densify(&mut self, step: &CloningStep) -> Result<Densified, GpuError> {
+        let (Some(grower), Some(cloner)) = (&self.grower, &self.cloner) else { return Ok(Densified::default()) };
+        let extent = self.scene.trained_with.spatial_lr_scale;
+        let densified = cloner.densify(self.headless, &self.parameters, grower, extent, step)?;
+        self.slice();
+        Ok(densified)
+    }
+
+    /// Returns the mean gradient of each Gaussian on the screen in the steps since the last densification; none unless the scene
+    /// [grows as the original](Self::set_cloning).
+    ///
+    /// # Errors
+    /// A lost device.
+    pub fn screen_gradients(&self, batch: usize) -> Result<Vec<f32>, GpuError> {
+        self.cloner.as_ref().map_or(Ok(Vec::new()), |cloner| cloner.gradients(self.headless, batch))
+    }
+
+    /// Lowers all opacities to at most 0.01, as the original does from time to time.
+    ///
+    /// # Errors
+    /// A lost device.
+    pub fn reset_opacity(&mut self) -> Result<(), GpuError> {
+        reset(self.headless, &self.parameters)?;
+        self.slice();
+        Ok(())
+    }
+
+    /// Returns the number of Gaussians, without free places if the scene [grows as the original](Self::set_cloning).
+    ///
+    /// # Errors
+    /// A lost device.
+    pub fn taken(&self) -> Result<usize, GpuError> {
+        match &self.cloner {
+            Some(_) => taken(self.headless, &self.parameters),
+            None => Ok(self.count() as usize),
+        }
+    }
+
     /// Makes a step with the gradients accumulated so far, which become 0; the first `step` is 1.
     ///
     /// # Errors
@@ -427,6 +486,9 @@ impl<'a> Trainer<'a> {
                 let least_log_scale_t = least.max(f64::from(f32::MIN_POSITIVE)).ln() as f32;
                 let settings = NoiseUniforms { count: parameters.count(), seed, strength, least_log_scale_t };
                 grower.record_noise(queue, &mut pass, settings);
+            }
+            if let (Some(cloner), Some(StepGrowth { adds_up: true, .. })) = (&self.cloner, growth) {
+                cloner.record(&mut pass, parameters.count());
             }
             if let Some(tied) = tied {
                 tied.record_expand(&mut pass, passes, color);
@@ -611,7 +673,11 @@ impl<'a> Trainer<'a> {
         let exposure = self.exposure.as_ref().map(|exposure| &exposure.values);
         let all = [Some(geometry), Some(color), environment, exposure, self.tied.as_ref().map(|tied| &tied.entries)];
         let optimized = all.into_iter().flatten().flat_map(Optimized::stored);
-        optimized.chain(self.rounder.as_ref().map(|rounder| &rounder.changes)).collect()
+        let others = [
+            self.rounder.as_ref().map(|rounder| &rounder.changes),
+            self.cloner.as_ref().map(|cloner| &cloner.statistics),
+        ];
+        optimized.chain(others.into_iter().flatten()).collect()
     }
 
     /// Sets all moments to 0, as before the first step.
