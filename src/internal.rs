@@ -195,8 +195,12 @@ pub mod offline {
     /// Training.
     pub mod fine_tune {
         pub use crate::offline::fine_tune::adam::*;
+        pub use crate::offline::fine_tune::cloner::*;
+        pub use crate::offline::fine_tune::cloning::*;
         pub use crate::offline::fine_tune::dropout::*;
         pub use crate::offline::fine_tune::environment_backward::*;
+        pub use crate::offline::fine_tune::exposure::*;
+        pub use crate::offline::fine_tune::growth::Cloning;
         pub use crate::offline::fine_tune::loss::*;
         pub use crate::offline::fine_tune::neighbors::*;
         pub use crate::offline::fine_tune::noise::*;

@@ -15,7 +15,7 @@ const FIRST_SEEN: u32 = 3u;
 @group(0) @binding(2) var<storage, read_write> gradients: array<vec4<f32>>;
 @group(0) @binding(3) var<storage, read_write> first_moments: array<vec4<f32>>;
 @group(0) @binding(4) var<storage, read_write> second_moments: array<vec4<f32>>;
-// Written by `project_backward`: from FIRST_SEEN on, one word for each Gaussian: 1 if it is visible in a view of the batch.
+// Written by `project_backward`: from FIRST_SEEN on, one word for each Gaussian: the number of views of the batch that show it.
 @group(0) @binding(5) var<storage, read> notes: array<u32>;
 
 // Each Gaussian has `stride` four-vectors. The first four have their own rates; all others use the last rate.

@@ -31,7 +31,8 @@ const FIRST_SEEN: u32 = 3u;
 @group(3) @binding(2) var<storage, read_write> trained_gradients: array<TrainedRecord>;
 @group(3) @binding(3) var<storage, read_write> harmonic_gradients: array<vec4<f32>>;
 // Number of gradients that are not finite so far; for the first of them the index of the Gaussian plus one and the number of the view. Then
-// one word for each Gaussian: 1 if it is visible in a view of the batch.
+// one word for each Gaussian: the number of views of the batch that show it; then a number for each: the sum of the lengths of the gradients
+// of its center in these views, in normalized device coordinates.
 @group(3) @binding(4) var<storage, read_write> notes: array<atomic<u32>>;
 
 // Sums over the pairs of a splat, see `blend_backward`.
@@ -158,7 +159,7 @@ fn project_backward(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let index = index_of(id.x);
-    atomicStore(&notes[FIRST_SEEN + index], 1u);
+    atomicAdd(&notes[FIRST_SEEN + index], 1u);
     let splat = read_splat(splats[slot]);
     let sums = sums_of(slot);
     if !is_finite(vec4(sums.center, sums.opacity, sums.color.x)) || !is_finite(vec4(sums.conic, sums.color.y + sums.color.z + sums.depth)) {
@@ -175,6 +176,8 @@ fn project_backward(@builtin(global_invocation_id) id: vec3<u32>) {
     let conic = conic_entries(splat.conic);
     let by_center = -vec2(sums.center.x * conic.x + sums.center.y * conic.y, sums.center.y * conic.z + sums.center.x * conic.y);
     let by_ndc = by_center * 0.5 * vec2<f32>(instance.size);
+    let at_length = FIRST_SEEN + scene.count + index;
+    atomicStore(&notes[at_length], bitcast<u32>(bitcast<f32>(atomicLoad(&notes[at_length])) + length(by_ndc)));
     let by_conic = vec3(-0.5, -1.0, -0.5) * sums.conic;
     let by_opacity = sums.opacity / splat.opacity;
     let by_color = select(vec3(0.0), sums.color, splat.color > vec3(0.0));

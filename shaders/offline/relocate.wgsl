@@ -1,6 +1,7 @@
 // relocate: gives Gaussians the colors of others, and begins their moments again.
-// In: moves, each from one Gaussian to another that no move starts from. Out: the colors of the others; moments of both are 0. The raw
-// parameters are written by the host. CPU reference: src/offline/fine_tune/relocation.rs.
+// In: moves, each from one Gaussian to another that no move to a third starts from, or to itself. Out: the colors of the others; moments are 0, those
+// of the sources too unless they keep them. The raw parameters are written by the host. CPU references: src/offline/fine_tune/relocation.rs,
+// src/offline/fine_tune/cloning.rs.
 #import gs4d::training::RelocationUniforms
 
 // Four-vectors of the raw parameters of each Gaussian.
@@ -33,13 +34,19 @@ fn relocate(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroup
         let to = moves[i / width].x;
         let source = moves[i / width].y;
         if place < settings.stride {
-            colors[to * settings.stride + place] = colors[source * settings.stride + place];
+            if source != to {
+                colors[to * settings.stride + place] = colors[source * settings.stride + place];
+            }
             forget_color(to * settings.stride + place);
-            forget_color(source * settings.stride + place);
+            if settings.keeps == 0u {
+                forget_color(source * settings.stride + place);
+            }
         }
         if place < GEOMETRY {
             forget_geometry(to * GEOMETRY + place);
-            forget_geometry(source * GEOMETRY + place);
+            if settings.keeps == 0u {
+                forget_geometry(source * GEOMETRY + place);
+            }
         }
     }
 }

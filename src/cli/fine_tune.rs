@@ -5,6 +5,7 @@
 
 use super::args::{CheckpointArgs, Given, PackageArgs, RendererArgs, SplitArgs, TrainingArgs, ValidationArgs, values};
 use super::curve::curve_table;
+use super::exposures::exposure_row;
 use super::failure::Failure;
 use super::interrupt;
 use super::progress::Bars;
@@ -146,7 +147,7 @@ impl FineTune {
         if !interrupted {
             store.remove()?;
         }
-        let FineTuned { curve, best, steps_per_second, validation, faults, .. } = &tuned;
+        let FineTuned { curve, best, steps_per_second, validation, faults, exposures, .. } = &tuned;
         // The last point of a compressed result is measured on the package.
         let compressed = self.compress.and_then(|_| curve.last()).filter(|_| !interrupted);
         let written = compressed.unwrap_or(best);
@@ -170,6 +171,7 @@ impl FineTune {
             ("PSNR", quality),
             ("wrote", format!("{}, {}{form}", out.display(), bytes(size))),
         ];
+        pairs.extend(exposure_row(&tuned));
         if interrupted {
             let form = if self.compress.is_some() { ", not compressed" } else { "" };
             pairs.push(("interrupted", format!("wrote the best parameters so far{form}; the same command resumes")));
@@ -190,6 +192,7 @@ impl FineTune {
             "psnr": written.psnr,
             "compressed": compressed.is_some(),
             "curve": curve,
+            "exposures": exposures,
             "steps_per_second": steps_per_second,
             "interrupted": interrupted,
             "gradients_left_out": faults.map_or(0, |faults| faults.count),

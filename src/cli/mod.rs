@@ -17,6 +17,7 @@ mod curve;
 mod detail;
 mod eval;
 mod export;
+mod exposures;
 mod failure;
 mod fine_tune;
 mod fleet;

@@ -5,6 +5,7 @@
 
 use super::args::{Given, PackageArgs, RendererArgs, SplitArgs, TrainingArgs, WITHOUT_TIME, values};
 use super::curve::curve_table;
+use super::exposures::exposure_row;
 use super::failure::Failure;
 use super::interrupt;
 use super::progress::Bars;
@@ -13,22 +14,24 @@ use super::table::{bytes, lines};
 use crate::offline::dataset::Validation;
 use crate::offline::engine::AdapterDescription;
 use crate::offline::files::Files;
-use crate::offline::fine_tune::{FineTuneSettings, FineTuned, Growth, Rates, Terms, require_room};
+use crate::offline::fine_tune::{Cloning, FineTuneSettings, FineTuned, Growth, Rates, Terms, require_room};
 use crate::offline::store::Store;
 use crate::offline::train::{CaptureSettings, Start, StartSettings, TrainSettings, TrainedCapture, Training};
 use serde_json::json;
 
 /// Train a capture from nothing but the pictures of a dataset.
 ///
-/// The number of Gaussians is fixed: those that fade move to others. OUT has the parameters with the best PSNR on the validation views so
-/// far (with --validation none the latest) and is rewritten as training goes on: a player that reloads changed files shows it. A
-/// killed run resumes from OUT.train/ and writes the same bytes as an uninterrupted one. Ctrl-C ends the run and writes the best parameters
-/// so far; a second Ctrl-C ends it immediately.
+/// The number of Gaussians is fixed: those that fade move to others (with --densify original it grows up to --gaussians). OUT has the
+/// parameters with the best PSNR on the validation views so far (with --validation none the latest) and is rewritten as training goes on: a
+/// player that reloads changed files shows it. A killed run resumes from OUT.train/ and writes the same bytes as an uninterrupted one.
+/// Ctrl-C ends the run and writes the best parameters so far; a second Ctrl-C ends it immediately.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
   gs4d train --data data/hook --resolution 2 -o hook.gs4d
   gs4d train --data data/hook --resolution 2 --gaussians 30000 --steps 10000 -o small.gs4d
+  gs4d train --data data/hook --resolution 2 --densify original --gaussians 200000 -o original.gs4d
+  gs4d train --data data/cameras --exposure -o even.gs4d     # cameras of different exposure or white balance
 
 The result is as large as a checkpoint: gs4d bake prunes and compresses it.")]
 pub(super) struct Train {
@@ -48,7 +51,7 @@ pub(super) struct Train {
     /// Background color, 0 to 1 in the space of the pictures.
     #[arg(long, value_name = "R,G,B", default_value = "0,0,0", value_parser = values::color, allow_hyphen_values = true)]
     background: [f32; 3],
-    /// Number of Gaussians.
+    /// Number of Gaussians; with --densify original the most that there are at any step.
     #[arg(long, value_name = "N", default_value = "60000", value_parser = values::count(100_000_000))]
     gaussians: usize,
     /// Where Gaussians begin: hull, inside the silhouettes of the images, random, in the box that the cameras look at, or auto: the first
@@ -84,12 +87,17 @@ pub(super) struct Train {
     /// Weight of SSIM in the loss, 0 to 1; the rest is L1.
     #[arg(long, value_name = "WEIGHT", default_value = "0.2", value_parser = values::share)]
     similarity: f64,
-    /// Weight, in the loss, of the mean opacity: unneeded Gaussians fade, and move elsewhere.
-    #[arg(long, value_name = "WEIGHT", default_value = "0.01", value_parser = values::not_negative)]
-    opacity_weight: f64,
-    /// Weight, in the loss, of the mean spatial scale.
-    #[arg(long, value_name = "WEIGHT", default_value = "0.01", value_parser = values::not_negative)]
-    scale_weight: f64,
+    /// Weight, in the loss, of the mean opacity: unneeded Gaussians fade, and move elsewhere [default: 0.01, with --densify original 0].
+    #[arg(long, value_name = "WEIGHT", value_parser = values::not_negative)]
+    opacity_weight: Option<f64>,
+    /// Weight, in the loss, of the mean spatial scale [default: 0.01, with --densify original 0].
+    #[arg(long, value_name = "WEIGHT", value_parser = values::not_negative)]
+    scale_weight: Option<f64>,
+    /// How Gaussians come to where they are missing: relocate moves those that have faded, with noise and dropout; original, for comparison,
+    /// begins with a quarter of --gaussians and, in the first half of the steps, does as the original 4DGS: it clones or splits those with
+    /// large gradients on the screen, up to --gaussians, removes faint and large ones, and resets opacities.
+    #[arg(long, value_name = "HOW", default_value = "relocate", value_parser = values::one_of(&DENSIFY))]
+    densify: Densify,
     /// Steps between two relocations of the Gaussians that have faded; 0: none is relocated.
     #[arg(long, value_name = "N", default_value = "100")]
     relocate_every: usize,
@@ -117,6 +125,15 @@ pub(super) struct Train {
     renderer: RendererArgs,
 }
 
+/// How Gaussians come where they are missing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Densify {
+    Relocate,
+    Original,
+}
+
+const DENSIFY: [(&str, Densify); 2] = [("relocate", Densify::Relocate), ("original", Densify::Original)];
+
 /// Parses a temporal scale as a share of the interval.
 fn time_scale(text: &str) -> Result<f64, String> {
     let share = text.trim().parse::<f64>().ok().filter(|share| (1e-3..=100.0).contains(share));
@@ -136,8 +153,8 @@ impl Train {
         let settings = self.settings();
         let training = Training::open(&settings, progress)?;
         let mut headless = self.renderer.open()?;
-        let StartSettings { gaussians, degree, degree_t, .. } = settings.start;
-        require_room(&headless, gaussians, degree, degree_t).map_err(|error| {
+        let StartSettings { degree, degree_t, .. } = settings.start;
+        require_room(&headless, settings.capacity(), degree, degree_t).map_err(|error| {
             Failure::new(format!("{error}; --gaussians and --sh-degree make them fewer or smaller"))
         })?;
         let deferred = interrupt::defer();
@@ -149,7 +166,7 @@ impl Train {
         if !interrupted {
             store.remove()?;
         }
-        let FineTuned { scene, curve, best, steps_per_second, validation, faults } = tuned;
+        let FineTuned { scene, curve, best, steps_per_second, validation, faults, exposures } = tuned;
         let quality = match best.psnr {
             Some(psnr) => format!("{psnr:.3} dB at step {} ({validation} validation views)", best.step),
             None => "not measured, no validation views".to_owned(),
@@ -165,6 +182,7 @@ impl Train {
             ("PSNR", quality),
             ("wrote", format!("{}, {}", out.display(), bytes(size))),
         ];
+        pairs.extend(exposure_row(tuned));
         if interrupted {
             pairs.push(("interrupted", "wrote the best parameters so far; the same command resumes".to_owned()));
         }
@@ -184,6 +202,7 @@ impl Train {
             "best": best,
             "psnr": best.psnr,
             "curve": curve,
+            "exposures": exposures,
             "steps_per_second": steps_per_second,
             "interrupted": interrupted,
             "gradients_left_out": faults.map_or(0, |faults| faults.count),
@@ -199,6 +218,12 @@ impl Train {
         if self.validation == Validation::None {
             self.given.none_of(&["--patience"], "with --validation none: no evaluation is compared with another")?;
         }
+        if self.densify == Densify::Original {
+            let reason = "with --densify original, which neither relocates nor moves Gaussians at random";
+            self.given.none_of(&["--relocate-every", "--noise", "--dropout"], reason)?;
+            let reason = "with --densify original: places without a Gaussian would be neighbors";
+            self.given.none_of(&["--rigid-weight"], reason)?;
+        }
         match self.sh_degree < 3 {
             true => self.given.none_of(&["--sh-degree-t"], WITHOUT_TIME),
             false => Ok(()),
@@ -207,7 +232,10 @@ impl Train {
 
     fn start_settings(&self) -> StartSettings {
         StartSettings {
-            gaussians: self.gaussians,
+            gaussians: match self.densify {
+                Densify::Relocate => self.gaussians,
+                Densify::Original => Cloning::first(self.gaussians),
+            },
             start: self.start,
             time_scale: self.time_scale,
             seed: self.training.seed,
@@ -230,22 +258,27 @@ impl Train {
 
     fn tuning(&self) -> FineTuneSettings {
         let shared = self.training.settings();
-        let usual = Growth::over(self.steps);
+        let (growth, weight) = match self.densify {
+            Densify::Relocate => {
+                let relocate_every = (self.relocate_every > 0).then_some(self.relocate_every);
+                let (noise, dropout) = (self.noise, self.dropout);
+                (Growth { relocate_every, noise, dropout, ..Growth::over(self.steps) }, 0.01)
+            }
+            Densify::Original => (Growth::original(self.steps, self.gaussians), 0.0),
+        };
+        let (opacity, scale) = (self.opacity_weight.unwrap_or(weight), self.scale_weight.unwrap_or(weight));
         FineTuneSettings {
             steps: self.steps,
             rates: Rates { mean: Rates::OURS.mean * self.mean_rate, ..Rates::OURS },
             last_rate: self.last_rate,
             similarity_share: self.similarity,
-            terms: Terms { opacity: self.opacity_weight, scale: self.scale_weight, ..shared.terms },
+            terms: Terms { opacity, scale, ..shared.terms },
             evaluate_every: self.evaluate_every,
             growth: Some(Growth {
-                relocate_every: (self.relocate_every > 0).then_some(self.relocate_every),
-                noise: self.noise,
-                dropout: self.dropout,
                 least_time_scale: self.least_time_scale,
                 last_mean_rate: self.last_mean_rate,
-                raise_every: self.raise_degree_every.unwrap_or(usual.raise_every),
-                ..usual
+                raise_every: self.raise_degree_every.unwrap_or(growth.raise_every),
+                ..growth
             }),
             ..shared
         }

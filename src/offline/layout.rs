@@ -74,6 +74,26 @@ pub struct LossUniforms {
     pub padding: u32,
 }
 
+/// Input of `exposure` for one view.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct ExposureUniforms {
+    /// Background color; 1, or 0 if what is behind the Gaussians is exposed too.
+    pub background: [f32; 4],
+    /// Picture size, pixels.
+    pub size: [u32; 2],
+    /// Tiles across and down.
+    pub tiles: [u32; 2],
+    /// Weight of the view in the loss of the batch.
+    pub share: f32,
+    /// Weight of the pull to the identity in the loss of the view.
+    pub pull: f32,
+    /// Number of the camera.
+    pub camera: u32,
+    /// Unused.
+    pub padding: u32,
+}
+
 /// Input of `codebooks`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
@@ -161,6 +181,8 @@ pub struct RelocationUniforms {
     pub moves: u32,
     /// Four-vectors of the color of each Gaussian.
     pub stride: u32,
+    /// 1: Gaussians that others get their colors from keep their moments.
+    pub keeps: u32,
     /// Unused.
-    pub padding: [u32; 2],
+    pub padding: u32,
 }

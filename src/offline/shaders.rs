@@ -22,12 +22,14 @@ const PASSES: &[(&str, &str)] = &[
     ("loss", include_str!("../../shaders/offline/loss.wgsl")),
     ("blend_backward", include_str!("../../shaders/offline/blend_backward.wgsl")),
     ("environment_backward", include_str!("../../shaders/offline/environment_backward.wgsl")),
+    ("exposure", include_str!("../../shaders/offline/exposure.wgsl")),
     ("project_backward", include_str!("../../shaders/offline/project_backward.wgsl")),
     ("regularize", include_str!("../../shaders/offline/regularize.wgsl")),
     ("codebooks", include_str!("../../shaders/offline/codebooks.wgsl")),
     ("adam", include_str!("../../shaders/offline/adam.wgsl")),
     ("dropout", include_str!("../../shaders/offline/dropout.wgsl")),
     ("noise", include_str!("../../shaders/offline/noise.wgsl")),
+    ("statistics", include_str!("../../shaders/offline/statistics.wgsl")),
     ("relocate", include_str!("../../shaders/offline/relocate.wgsl")),
 ];
 

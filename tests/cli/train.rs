@@ -50,6 +50,39 @@ fn a_capture_is_trained_from_the_pictures_of_a_dataset() {
     gs4d(&arguments!["eval", &out, "--data", &capture.data, "--metrics", "psnr", "--json"]).json();
 }
 
+#[test]
+fn exposures_are_reported_and_not_stored() {
+    let Some(capture) = dataset() else { return };
+    let out = capture.path("out.gs4d");
+    let command = arguments!["train", "--data", &capture.data, "-o", &out, "--gaussians", "100", "--sh-degree", "0"];
+    let short = ["--steps", "20", "--validation", "none", "--exposure"].map(Into::into);
+    let command = [command.to_vec(), short.to_vec()].concat();
+    let text = gs4d(&command).text();
+    assert!(text.contains("of 4 cameras, gains "), "one for each training camera: {text}");
+    let json = gs4d(&[command, vec!["--json".into()]].concat()).json();
+    let exposures = json["exposures"].as_array().expect("a list");
+    let rows = exposures.iter().map(|exposure| exposure.as_array().map_or(0, Vec::len));
+    assert_eq!(rows.collect::<Vec<_>>(), [3; 4], "three rows each: {json}");
+}
+
+#[test]
+fn gaussians_are_cloned_and_split_as_in_the_original_on_request() {
+    let Some(capture) = dataset() else { return };
+    let out = capture.path("out.gs4d");
+    let command = arguments!["train", "--data", &capture.data, "-o", &out, "--gaussians", "200", "--sh-degree", "0"];
+    let command = [command.to_vec(), ["--densify", "original", "--json"].map(Into::into).to_vec()].concat();
+    let run = |more: &[&str]| gs4d(&[command.clone(), more.iter().map(Into::into).collect()].concat());
+    run(&["--noise", "1"]).must_fail("--noise has no effect with --densify original");
+    run(&["--rigid-weight", "1"]).must_fail("--rigid-weight");
+    let run = run(&["--steps", "240", "--evaluate-every", "120"]);
+    assert!(run.err.contains(" cloned, "), "progress has what was done: {}", run.err);
+    let json = run.json();
+    let count = json["gaussians"].as_u64().expect("a number");
+    assert!(count != 50 && count <= 200, "a quarter at first, at most as many as asked for: {json}");
+    let info = gs4d(&arguments!["info", &out, "--json"]).json();
+    assert_eq!(info["gaussians"].as_u64(), Some(count), "the package has no other Gaussians: {info}");
+}
+
 #[cfg(unix)]
 #[test]
 fn an_interrupted_run_has_written_the_best_parameters() {

@@ -8,8 +8,8 @@ use crate::support::{golden, gpu};
 use bevy_gs4d::gaussian::{GradientMode, Harmonics, Parameters};
 use bevy_gs4d::internal::gaussian::ParameterGradient;
 use bevy_gs4d::internal::offline::fine_tune::{
-    GpuImage, Moments, NEIGHBORS, Sample, Trainer, adam, environment_backward, loss, neighbors, opacity_mask,
-    regularization,
+    Exposure, GpuImage, IDENTITY, Moments, NEIGHBORS, Sample, Trainer, adam, center, environment_backward, exposed,
+    exposure_backward, loss, neighbors, opacity_mask, pull, regularization,
 };
 use bevy_gs4d::internal::scene::packed::encode::Bits;
 use bevy_gs4d::offline::dataset::CoveredImage;
@@ -142,6 +142,80 @@ fn the_gradient_of_the_environment_map_matches_the_cpu_reference() {
     // Texel coordinates depend on the inverse trigonometric functions of the driver, as in the golden views over a map.
     assert!(error < 1e-3, "the gradient differs by {error:.1e}");
     assert_eq!(found[0], found[1], "the sums are the same on every run");
+}
+
+#[test]
+fn exposures_are_trained_as_the_cpu_reference_says() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let lesson = Lesson::new(&mut headless);
+    let map = Environment { width: 4, height: 2, texels: (0..24).map(|i| i as f32 / 24.0).collect() };
+    let around = GaussianScene { environment: Some(map), ..lesson.disturbed() };
+    let exposures: [Exposure; 2] =
+        [[[1.2, 0.05, -0.02, 0.03], [0.01, 0.8, 0.04, -0.02], [-0.03, 0.02, 1.1, 0.05]], IDENTITY];
+    for (scene, background) in [(lesson.disturbed(), Background::Color(BEHIND)), (around, Background::Environment)] {
+        let behind = (background != Background::Environment).then(|| Vec3::from(BEHIND));
+        let mut trainer =
+            Trainer::new(&mut headless, scene.clone(), GradientMode::Exact).expect("the scene can be trained");
+        // Views 0 and 2 are of one camera, view 1 of another.
+        trainer.set_exposure(&[0, 1, 0]).expect("the shader compiles");
+        let mut state = trainer.state().expect("the state can be read");
+        let place = state.buffers.len() - 3;
+        state.buffers[place] = bytemuck::cast_slice(&exposures).to_vec();
+        assert!(trainer.resume(&state), "the exposures are part of the state");
+        assert_eq!(trainer.exposures().expect("exposures can be read"), exposures, "they are those of the state");
+        let images = lesson.upload(&trainer);
+        let samples = [0, 1, 2].map(|index| Sample { background, ..lesson.sample(&images, index) });
+        trainer.accumulate(&samples, 0.2).expect("the views are drawn");
+        let found = trainer.exposure_gradients().expect("gradients can be read");
+        let (gradients, totals) = (trainer.gradients().expect("they can be read"), trainer.totals().expect("also"));
+        let mut expected = [[[0.0f64; 4]; 3]; 2];
+        let (mut value, mut pixels) = (0.0, Vec::new());
+        for (index, camera) in [(0, 0), (1, 1), (2, 0)] {
+            let frame = trainer.draw(&lesson.views[index], background).expect("the view is drawn");
+            let image = lesson.images[index].over(behind.unwrap_or_default());
+            let loss = loss(&exposed(&frame, &exposures[camera], behind), &image, 0.2).expect("the same size");
+            let own = exposure_backward(&frame, &exposures[camera], behind, &loss.gradient);
+            let terms = own.exposure.as_flattened().iter().zip(pull(&exposures[camera]).1.as_flattened().to_vec());
+            for (sum, (gradient, pulled)) in expected[camera].as_flattened_mut().iter_mut().zip(terms) {
+                *sum += (gradient + pulled) / 3.0;
+            }
+            value += loss.value / 3.0;
+            pixels.push(own.pixels.iter().map(|pixel| pixel.map(|value| value / 3.0)).collect::<Vec<_>>());
+        }
+        assert!((totals.loss - value).abs() < 1e-5, "the loss is {}, expected {value}", totals.loss);
+        let flat = |values: &[[f32; 4]]| values.as_flattened().to_vec();
+        let expected_by_camera = expected.map(|rows| rows.map(|row| row.map(|value| value as f32)));
+        for (camera, (found, expected)) in found.iter().zip(&expected_by_camera).enumerate() {
+            let error = relative_error(&flat(found), &flat(expected));
+            assert!(error < 1e-3, "{background:?}: the gradient of exposure {camera} differs by {error:.1e}");
+        }
+        // A step, after which the mean of the exposures is the identity.
+        trainer.step(&Rates { exposure: 0.01, ..Rates::ORIGINAL }, 0.5, 1).expect("the step succeeds");
+        let after = trainer.exposures().expect("exposures can be read");
+        let mut stepped = exposures;
+        for (exposure, gradient) in stepped.iter_mut().zip(&found) {
+            for (own, &gradient) in exposure.as_flattened_mut().iter_mut().zip(gradient.as_flattened()) {
+                *own = adam(f64::from(*own), f64::from(gradient), &mut Moments::default(), 0.005, 1) as f32;
+            }
+        }
+        center(&mut stepped);
+        let error = relative_error(&flat(after.as_flattened()), &flat(stepped.as_flattened()));
+        assert!(error < 1e-5, "{background:?}: the step differs by {error:.1e}");
+        // The gradients of the Gaussians are those of the drawn picture.
+        let mut other = Trainer::new(&mut headless, scene, GradientMode::Exact).expect("the scene can be trained");
+        for (view, pixels) in lesson.views.iter().zip(&pixels) {
+            let depths = vec![0.0; pixels.len()];
+            other.accumulate_pixels(view, background, pixels, &depths).expect("the view is drawn");
+        }
+        let expected = other.gradients().expect("gradients can be read");
+        let (found, expected) = (trained(&gradients), trained(&expected));
+        let pairs = tensors(&found.parameters, &found.harmonics).into_iter();
+        for ((name, found), (_, expected)) in pairs.zip(tensors(&expected.parameters, &expected.harmonics)) {
+            let error = relative_error(&found, &expected);
+            println!("{background:?} {name:14} {error:.1e}");
+            assert!(error < 1e-3, "{background:?}: {name} differs by {error:.1e}");
+        }
+    }
 }
 
 /// A trained scene of a few hundred Gaussians, views of it, and its own pictures as their images.

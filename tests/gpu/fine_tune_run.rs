@@ -359,6 +359,7 @@ fn training_ends_early_when_it_no_longer_helps() {
         mean: 0.0,
         mean_t: 0.0,
         environment: 0.0,
+        exposure: 0.0,
     };
     let settings = FineTuneSettings { steps: 50, evaluate_every: 1, patience: Some(3), rates, ..Default::default() };
     let tuned = fine_tune(&mut headless, lesson.disturbed(None), &lesson.images, &settings, None, &mut NoProgress);

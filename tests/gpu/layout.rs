@@ -8,8 +8,8 @@ use bevy_gs4d::internal::gaussian::alpha::{ALPHA_MAX, ALPHA_MIN, TRANSMITTANCE_M
 use bevy_gs4d::internal::gaussian::conic::{LOW_PASS, MAX_VARIANCE, THIN};
 use bevy_gs4d::internal::offline::fine_tune::NEIGHBORS;
 use bevy_gs4d::internal::offline::layout::{
-    AdamUniforms, DropoutUniforms, FIRST_SEEN, LossUniforms, NoiseUniforms, RelocationUniforms, RoundingRecord,
-    TermWeights, TiedColors, TrainedRecord, TrainedScene,
+    AdamUniforms, DropoutUniforms, ExposureUniforms, FIRST_SEEN, LossUniforms, NoiseUniforms, RelocationUniforms,
+    RoundingRecord, TermWeights, TiedColors, TrainedRecord, TrainedScene,
 };
 use bevy_gs4d::internal::renderer::layout::{
     self, Activation, BLOCK, Counters, DIGITS, FrameUniforms, INSTANCE_STRIDE, INSTANCES_AT_ONCE, InstanceUniforms,
@@ -76,7 +76,7 @@ fn splat() -> Mirror {
     in_fours(mirror, "SplatRecord", ["place", "shape", "color", ""])
 }
 
-fn mirrors() -> [Mirror; 20] {
+fn mirrors() -> [Mirror; 21] {
     [
         gaussian(),
         mirror!(InstanceUniforms {
@@ -150,12 +150,13 @@ fn mirrors() -> [Mirror; 20] {
         mirror!(RoundingRecord { mean, velocity, shape_x, shape_y, shape_z }),
         mirror!(TrainedScene { count, model, prefilter_var, view }),
         mirror!(LossUniforms { background, size, tiles, share, similarity_share, mask_weight, padding }),
+        mirror!(ExposureUniforms { background, size, tiles, share, pull, camera, padding }),
         mirror!(TiedColors { count, stride, stages, padding }),
         mirror!(AdamUniforms { rates, correction, count, stride, sparse, values, padding }),
         mirror!(TermWeights { motion, rigid, opacity, scale }),
         mirror!(NoiseUniforms { count, seed, strength, least_log_scale_t }),
         mirror!(DropoutUniforms { count, seed, below, padding }),
-        mirror!(RelocationUniforms { moves, stride, padding }),
+        mirror!(RelocationUniforms { moves, stride, keeps, padding }),
     ]
 }
 
@@ -256,7 +257,7 @@ fn constant(module: &Module, name: &str) -> f64 {
 fn constants_of_the_passes_match_the_host() {
     let modules = modules();
     let threads = 256;
-    let expected: [(&str, &str, f64); 14] = [
+    let expected: [(&str, &str, f64); 16] = [
         ("activate", "BLOCK", BLOCK.into()),
         ("activate", "PER_THREAD", (BLOCK / threads).into()),
         ("sort", "BLOCK", BLOCK.into()),
@@ -269,6 +270,8 @@ fn constants_of_the_passes_match_the_host() {
         ("blend_backward", "PIXELS", (TILE_SIZE * TILE_SIZE).into()),
         ("project_backward", "FIRST_SEEN", FIRST_SEEN.into()),
         ("adam", "FIRST_SEEN", FIRST_SEEN.into()),
+        ("statistics", "FIRST_SEEN", FIRST_SEEN.into()),
+        ("exposure", "SIDE", TILE_SIZE.into()),
         ("regularize", "NEIGHBORS", NEIGHBORS as f64),
         ("loss", "SIDE", TILE_SIZE.into()),
     ];

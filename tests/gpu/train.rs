@@ -1,18 +1,22 @@
 //! Training from pictures alone: relocation, noise, the schedule of colors, and whole runs on a dataset of a few moving blobs.
 //!
 //! In: scenes and datasets made here. Out: proof that the passes `noise`, `relocate` and `regularize` have the results of their CPU references,
-//! that relocation hardly changes the picture, that a capture is trained from nothing, and that runs repeat and resume at the same bytes.
+//! that relocation hardly changes the picture, that the densification of the original is that of its CPU reference, that a capture is trained
+//! from nothing, and that runs repeat and resume at the same bytes.
 //! Skipped where there is no GPU.
 
 use crate::support::blob::blob;
 use crate::support::{dataset, gpu};
 use bevy_gs4d::gaussian::{Gaussian, GradientMode, Harmonics, Parameters};
+use bevy_gs4d::internal::offline::dataset::selection::camera_numbers;
 use bevy_gs4d::internal::offline::fine_tune::{
-    Sample, StepGrowth, Terms, Trainer, TrainerState, is_dropped, neighbors, noise, regularization, relocate,
+    Cloning, CloningStep, FREE, Sample, StepGrowth, Terms, Trainer, TrainerState, densify, is_dropped, is_free, loss,
+    neighbors, noise, regularization, relocate, reset_opacity,
 };
 use bevy_gs4d::internal::offline::layout::TrainedRecord;
 use bevy_gs4d::internal::offline::store::{Key, Store};
 use bevy_gs4d::internal::offline::train::{CaptureSettings, Start, StartSettings, begin, capture_of, train};
+use bevy_gs4d::internal::reference as passes;
 use bevy_gs4d::offline::dataset::TrainingView;
 use bevy_gs4d::offline::fine_tune::{FineTuneSettings, FineTuned, Growth, Rates, Resume, TrainingImages};
 use bevy_gs4d::offline::metrics::SquaredError;
@@ -21,7 +25,7 @@ use bevy_gs4d::reference;
 use bevy_gs4d::renderer::Headless;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{GaussianScene, RuntimeScene, SceneForm, Trained};
-use bevy_gs4d::view::{Background, Camera, RasterFov, View};
+use bevy_gs4d::view::{Appearance, Background, BlendSpace, Camera, RasterFov, View};
 use glam::{UVec2, Vec3};
 use std::path::Path;
 use tempfile::TempDir;
@@ -78,7 +82,7 @@ fn the_pass_noise_matches_the_cpu_reference() {
     (0..).zip(&mut expected).for_each(|(index, record)| noise(record, index, seed, strength, least.ln()));
     let mut trainer = growing(&mut headless, scene.clone());
     // The gradients are 0: the optimizer moves nothing.
-    let growth = StepGrowth { color_values: 144, noise: 5e5, least_time_scale, seed };
+    let growth = StepGrowth { color_values: 144, noise: 5e5, least_time_scale, seed, adds_up: false };
     trainer.step_growing(&Rates::OURS, factor, 1, Some(growth)).expect("the step succeeds");
     let found = trainer.scene().expect("the scene can be read");
     let (before, found) = (&trained(&scene).parameters, &trained(&found).parameters);
@@ -119,7 +123,7 @@ fn dropped_gaussians_are_hidden_until_the_next_step() {
     let dropped = trainer.draw(&view, black).expect("the view is drawn").picture;
     assert_eq!(dropped, expected, "the picture without the dropped Gaussians");
     assert_ne!(dropped, whole, "the dropped Gaussians were visible");
-    let still = StepGrowth { color_values: 144, noise: 0.0, least_time_scale: 0.0, seed };
+    let still = StepGrowth { color_values: 144, noise: 0.0, least_time_scale: 0.0, seed, adds_up: false };
     trainer.step_growing(&Rates::OURS, 1.0, 1, Some(still)).expect("the step succeeds");
     let after = trainer.draw(&view, black).expect("the view is drawn").picture;
     assert_eq!(after, whole, "every Gaussian is drawn after the step");
@@ -195,6 +199,116 @@ fn relocation_copies_what_the_cpu_reference_says_and_hardly_changes_the_picture(
     assert!(error.psnr() > 35.0, "the pictures hardly change: {:.2} dB", error.psnr());
 }
 
+/// Returns the length of the gradient of each splat's center in a view, in normalized device coordinates, and whether it is shown.
+fn screen_gradients(scene: &RuntimeScene, view: &View, pixels: &[Vec3]) -> Vec<(bool, f64)> {
+    let layer = passes::Layer { scene, view: *view, appearance: Appearance::default() };
+    let splats = passes::project(&layer, BlendSpace::Encoded);
+    let lists = passes::tile_lists(&splats, view);
+    let zero = vec![0.0; pixels.len()];
+    let pixels = passes::PixelGradients { color: pixels, depth: &zero, alpha: &zero };
+    let gradients = passes::blend_backward(&splats, &lists, view, |_, _| Vec3::ZERO, &pixels, GradientMode::Exact);
+    splats
+        .iter()
+        .zip(gradients)
+        .map(|(splat, gradient)| (splat.is_visible(), gradient.ndc[0].hypot(gradient.ndc[1])))
+        .collect()
+}
+
+#[test]
+fn the_densification_of_the_original_is_that_of_the_cpu_reference() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let mut scene = synthetic();
+    scene.trained_with.spatial_lr_scale = 3.0;
+    let parameters = &mut trained_mut(&mut scene).parameters;
+    // A third of the places are free, a few Gaussians are faint.
+    parameters.opacity_logit.iter_mut().step_by(3).for_each(|logit| *logit = FREE);
+    parameters.opacity_logit.iter_mut().skip(1).step_by(30).for_each(|logit| *logit = -6.0);
+    parameters.opacity_logit.iter_mut().skip(2).step_by(3).for_each(|logit| *logit += 1.0);
+    // Some are small, some are large.
+    parameters.log_scale.iter_mut().step_by(7).flatten().for_each(|scale| *scale -= 2.0);
+    parameters.log_scale.iter_mut().skip(8).step_by(50).flatten().for_each(|scale| *scale += 1.0);
+    let (views, black): (Vec<View>, _) =
+        ((0..4).map(|i| view(i, UVec2::new(70, 54))).collect(), Background::Color([0.0; 3]));
+    let mut trainer = growing(&mut headless, scene);
+    trainer.set_cloning().expect("the shader compiles");
+    let texels: Vec<[u8; 4]> = (0..70 * 54).map(|i| [(i * 7 % 200) as u8, 120, (i / 70 * 4) as u8, 255]).collect();
+    let image = bevy_gs4d::offline::dataset::CoveredImage { size: views[0].size, texels, has_gaps: false };
+    let uploaded = trainer.upload(&image).expect("the image fits the GPU");
+    // Steps of two views each; the parameters stay.
+    let still = Rates { mean: 0.0, mean_t: 0.0, scale: 0.0, rotation: 0.0, opacity: 0.0, ..Rates::OURS };
+    let mut sums = vec![[0.0f64; 2]; COUNT];
+    for (step, own) in [[0, 1], [2, 3], [1, 2]].into_iter().enumerate() {
+        let runtime = trainer.scene().expect("it can be read").into_runtime().expect("it can be drawn");
+        let mut of_step = vec![(0, 0.0); COUNT];
+        for index in own {
+            let drawn = trainer.draw(&views[index], black).expect("the view is drawn").picture;
+            let loss = loss(&drawn, &image.over(Vec3::ZERO), 0.2).expect("one size");
+            for (sum, (shown, length)) in
+                of_step.iter_mut().zip(screen_gradients(&runtime, &views[index], &loss.gradient))
+            {
+                sum.0 += usize::from(shown);
+                sum.1 += length;
+            }
+        }
+        for (sum, (shown, length)) in sums.iter_mut().zip(of_step).filter(|(_, (shown, _))| *shown > 0) {
+            sum[0] += length / shown as f64;
+            sum[1] += 1.0;
+        }
+        let sample = |index: usize| Sample { view: &views[index], image: &uploaded, background: black, number: 0 };
+        trainer.accumulate(&own.map(sample), 0.2).expect("the views are drawn");
+        let growth = StepGrowth { color_values: 3, noise: 0.0, least_time_scale: 0.0, seed: 0, adds_up: true };
+        trainer.step_growing(&still, 1.0, step + 1, Some(growth)).expect("the step succeeds");
+    }
+    let found = trainer.screen_gradients(2).expect("they can be read");
+    let mut shown = 0;
+    for (index, (&found, [sum, steps])) in found.iter().zip(sums).enumerate() {
+        let expected = sum / steps.max(1.0);
+        let error = (f64::from(found) - expected).abs();
+        assert!(error <= 1e-2 * expected + 1e-7, "the gradient of Gaussian {index} is {found}, expected {expected}");
+        shown += usize::from(expected > 2e-4);
+    }
+    assert!(shown > 10, "some gradients are large: {shown}");
+    let before = trainer.state().expect("the state can be read");
+    let mut expected: Vec<TrainedRecord> = bytemuck::pod_collect_to_vec(&before.buffers[0]);
+    let step = CloningStep { batch: 2, removes_large: true, seed: 3 };
+    let densified = densify(&mut expected, &found, 3.0, true, 3);
+    println!("{} cloned, {} split, {} removed", densified.cloned, densified.split, densified.removed);
+    assert!(densified.cloned > 2 && densified.split > 5 && densified.removed > 10, "all kinds: {densified:?}");
+    assert_eq!(trainer.densify(&step).expect("the device works"), densified, "the same Gaussians");
+    let after = trainer.state().expect("the state can be read");
+    let records: Vec<TrainedRecord> = bytemuck::pod_collect_to_vec(&after.buffers[0]);
+    assert_eq!(records, expected, "the raw parameters are those of the CPU reference");
+    let taken = expected.iter().filter(|record| !is_free(record)).count();
+    assert_eq!(trainer.taken().expect("it can be read"), taken, "the number of Gaussians");
+    let mut source: Vec<usize> = (0..COUNT).collect();
+    let mut is_new = vec![false; COUNT];
+    for &[to, from] in &densified.moves {
+        source[to as usize] = from as usize;
+        is_new[to as usize] = true;
+    }
+    let (colors, colors_before) = (rows(&after, 3), rows(&before, 3));
+    assert!((0..COUNT).all(|index| colors[index] == colors_before[source[index]]), "colors are those of the sources");
+    for buffer in [1, 2, 4, 5] {
+        let (moments, moments_before) = (rows(&after, buffer), rows(&before, buffer));
+        for index in 0..COUNT {
+            let expected = if is_new[index] { vec![0.0; moments[index].len()] } else { moments_before[index].clone() };
+            assert_eq!(moments[index], expected, "buffer {buffer}: the moments of Gaussian {index}");
+        }
+    }
+    assert_eq!(trainer.screen_gradients(2).expect("they can be read"), [0.0; COUNT], "sums begin again");
+    trainer.reset_opacity().expect("the device works");
+    reset_opacity(&mut expected);
+    let reset = trainer.state().expect("the state can be read");
+    let records: Vec<TrainedRecord> = bytemuck::pod_collect_to_vec(&reset.buffers[0]);
+    assert_eq!(records, expected, "opacities are reset as in the CPU reference");
+    for buffer in [1, 2] {
+        for (index, (found, before)) in rows(&reset, buffer).iter().zip(rows(&after, buffer)).enumerate() {
+            assert_eq!(found[16..], [0.0; 4], "buffer {buffer}: the moments of the opacity of Gaussian {index}");
+            assert_eq!(found[..16], before[..16], "buffer {buffer}: its other moments");
+        }
+    }
+}
+
 #[test]
 fn the_gradient_of_the_term_of_scale_matches_the_cpu_reference() {
     let Some(mut headless) = gpu::headless() else { return };
@@ -230,7 +344,7 @@ fn color_values_beyond_the_degree_are_not_trained() {
         let image = trainer.upload(&image).expect("the image fits the GPU");
         let sample = Sample { view: &view, image: &image, background: Background::None, number: 0 };
         trainer.accumulate(&[sample], 0.2).expect("the view is drawn");
-        let growth = StepGrowth { color_values: values, noise: 0.0, least_time_scale: 0.0, seed: 1 };
+        let growth = StepGrowth { color_values: values, noise: 0.0, least_time_scale: 0.0, seed: 1, adds_up: false };
         trainer.step_growing(&Rates::OURS, 1.0, 1, Some(growth)).expect("the step succeeds");
         let found = trainer.scene().expect("the scene can be read");
         let (before, after) = (&trained(&scene).harmonics.values, &trained(&found).harmonics.values);
@@ -274,7 +388,7 @@ impl Lesson {
         let splits = Splits::open(&data, &SplitOptions::default(), &scene.trained_with, &mut NoProgress);
         let splits = splits.expect("the dataset was just written");
         let all = splits.all_training(&scene.trained_with, &mut NoProgress).expect("the dataset was just written");
-        all.iter().for_each(|view| write_covered(&scene, view, &view.image));
+        all.iter().for_each(|view| write_covered(&scene, view, 1.0, &view.image));
         Self { folder, all, splits }
     }
 
@@ -302,15 +416,15 @@ impl Lesson {
     }
 }
 
-/// Writes the image of a view with its coverage.
-fn write_covered(scene: &RuntimeScene, view: &TrainingView, path: &Path) {
+/// Writes the image of a view with its coverage, as a camera of this gain takes it.
+fn write_covered(scene: &RuntimeScene, view: &TrainingView, gain: f32, path: &Path) {
     let to_draw = view.camera.view(view.time, RasterFov::Corrected);
     let frame = reference::render(scene, &to_draw, Background::None);
     let mut image = image::RgbaImage::new(view.camera.size.x, view.camera.size.y);
     let pixels = image.pixels_mut().zip(frame.picture.pixels.iter().zip(&frame.transmittance));
     for (pixel, (color, transmittance)) in pixels {
         let coverage = 1.0 - transmittance;
-        let [r, g, b] = (*color / coverage.max(1e-3)).to_array();
+        let [r, g, b] = (*color * gain / coverage.max(1e-3)).to_array();
         pixel.0 = [r, g, b, coverage].map(|value| (value.clamp(0.0, 1.0) * 255.0).round() as u8);
     }
     image.save(path).expect("the folder can be written to");
@@ -347,6 +461,88 @@ fn a_capture_is_trained_from_nothing() {
     }
 }
 
+#[test]
+fn exposures_even_out_cameras_that_differ() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let lesson = Lesson::new();
+    // Three cameras of nine see half the light; the camera held out has the mean gain, which is far from what most have.
+    let gain = |camera: u32| [0.5, 1.0, 1.0][camera as usize % 3];
+    const MEAN: f32 = 7.5 / 9.0;
+    let cameras = camera_numbers(&lesson.splits.train);
+    for (view, &camera) in lesson.splits.train.iter().zip(&cameras) {
+        write_covered(&blobs(), view, gain(camera), &view.image);
+    }
+    lesson.splits.validation.iter().for_each(|view| write_covered(&blobs(), view, MEAN, &view.image));
+    let start = StartSettings { gaussians: 300, degree: 0, ..StartSettings::default() };
+    let mut train = |exposure: bool| {
+        // Of few steps.
+        let rates = Rates { exposure: 5e-3, ..settings(300).rates };
+        let settings = FineTuneSettings { exposure, rates, ..settings(300) };
+        lesson.train(&mut headless, &start, &settings, None, None, &mut NoProgress).expect("the capture is trained")
+    };
+    let (without, with) = (train(false), train(true));
+    let [before, after] = [&without, &with].map(|tuned| tuned.best.psnr.expect("validation views"));
+    println!("validation: {before:.2} dB without exposures, {after:.2} dB with them");
+    assert!(after > before + 1.0, "exposures raise the PSNR of the camera held out: {before:.2} to {after:.2} dB");
+    assert_eq!((without.exposures.len(), with.exposures.len()), (0, 9), "each training camera has one");
+    for (camera, exposure) in with.exposures.iter().enumerate() {
+        // On a gray of 0.5, in the mean of the channels.
+        let found = exposure.iter().map(|[r, g, b, offset]| r + g + b + 2.0 * offset).sum::<f32>() / 3.0;
+        let expected = gain(camera as u32) / MEAN;
+        println!("camera {camera}: {found:.2}, expected {expected:.2}");
+        assert!((found - expected).abs() < 0.2, "camera {camera}: a gain of {found:.2}, {expected:.2} expected");
+    }
+}
+
+/// Returns the settings of a training that clones and splits as the original, up to so many Gaussians.
+fn original(steps: usize, capacity: usize) -> FineTuneSettings {
+    let usual = settings(steps);
+    let cloning = Cloning { capacity, every: 10, from: 10, until: steps / 2, reset_every: steps / 3 };
+    let growth =
+        Growth { relocate_every: None, noise: 0.0, dropout: 0.0, cloning: Some(cloning), ..Growth::over(steps) };
+    FineTuneSettings { growth: Some(growth), terms: Terms::default(), ..usual }
+}
+
+#[test]
+fn a_capture_grows_from_few_gaussians_as_in_the_original() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let lesson = Lesson::new();
+    let start = StartSettings { gaussians: 60, degree: 1, ..StartSettings::default() };
+    let out = lesson.folder.path().join("out.gs4d");
+    let found = lesson.train(&mut headless, &start, &original(300, 250), None, Some(&out), &mut NoProgress);
+    let found = found.expect("the capture is trained");
+    let (psnr, count) = (found.best.psnr.expect("validation views"), found.scene.len());
+    println!("{count} Gaussians, {psnr:.2} dB");
+    assert!((61..=250).contains(&count), "there are more than at first, and at most the capacity: {count}");
+    assert!(psnr > 22.0, "{psnr:.2} dB on the camera that is held out, more than 22 dB expected");
+    let logits = &trained(&found.scene).parameters.opacity_logit;
+    assert!(logits.iter().all(|&logit| logit > FREE), "the capture has no free places");
+    let written = bevy_gs4d::codec::load(&out, &Default::default()).expect("the package of an evaluation is whole");
+    assert!((60..=250).contains(&written.len()), "nor has the package: {}", written.len());
+}
+
+#[test]
+fn training_as_the_original_repeats_and_resumes_at_the_same_bytes() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let lesson = Lesson::new();
+    let start = StartSettings { gaussians: 60, ..StartSettings::default() };
+    let settings = FineTuneSettings { evaluate_every: 45, ..original(180, 120) };
+    let mut run = |store: Option<&Store>, progress: &mut dyn Progress| {
+        lesson.train(&mut headless, &start, &settings, store, None, progress)
+    };
+    let whole = run(None, &mut NoProgress).expect("the capture is trained");
+    assert!(whole.scene.len() != 60, "Gaussians were cloned, split or removed: {}", whole.scene.len());
+    let again = run(None, &mut NoProgress).expect("the capture is trained");
+    assert!(whole.scene == again.scene && whole.curve == again.curve, "a second run has the same result");
+    // Between two densifications: the sums of gradients are part of the state.
+    let store = lesson.store("original");
+    let stopped = run(Some(&store), &mut Interrupting { left: 55, is_training: false });
+    let stopped = stopped.map_err(|error| *error);
+    assert!(matches!(stopped, Err(OfflineError::Interrupted { tuned: Some(_) })), "interrupted");
+    let resumed = run(Some(&store), &mut NoProgress).expect("the capture is trained");
+    assert!(resumed.scene == whole.scene && resumed.curve == whole.curve, "the resumed run has the same result");
+}
+
 /// Interrupts training after so many steps.
 struct Interrupting {
     left: usize,
@@ -381,8 +577,12 @@ fn training_from_nothing_repeats_and_resumes_at_the_same_bytes() {
     let growth =
         Growth { relocate_every: Some(10), relocate_from: 0, relocate_until: 60, raise_every: 8, ..Growth::over(60) };
     // Opacities fall fast, so that Gaussians fade within these steps.
-    let settings =
-        FineTuneSettings { rates: Rates { opacity: 0.5, ..Rates::OURS }, growth: Some(growth), ..settings(60) };
+    let settings = FineTuneSettings {
+        rates: Rates { opacity: 0.5, ..Rates::OURS },
+        growth: Some(growth),
+        exposure: true,
+        ..settings(60)
+    };
     let mut run = |store: Option<&Store>, progress: &mut dyn Progress| {
         lesson.train(&mut headless, &start, &settings, store, None, progress)
     };
@@ -399,6 +599,7 @@ fn training_from_nothing_repeats_and_resumes_at_the_same_bytes() {
         );
         let resumed = run(Some(&store), &mut NoProgress).expect("the capture is trained");
         assert!(resumed.scene == whole.scene, "after {left} steps: the resumed run has the same scene");
+        assert_eq!(resumed.exposures, whole.exposures, "after {left} steps: the resumed run has the same exposures");
         assert_eq!(resumed.curve, whole.curve, "after {left} steps: the resumed run has the same curve");
     }
     let other = lesson.train(

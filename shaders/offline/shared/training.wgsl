@@ -52,6 +52,20 @@ struct LossUniforms {
     padding: u32,
 }
 
+// Input of `exposure` for one view.
+struct ExposureUniforms {
+    // Background color; w: 1, or 0 if what is behind the Gaussians is exposed too.
+    background: vec4<f32>,
+    size: vec2<u32>,
+    tiles: vec2<u32>,
+    // Weight of the view in the loss of the batch.
+    share: f32,
+    // Weight of the pull to the identity in the loss of the view.
+    pull: f32,
+    camera: u32,
+    padding: u32,
+}
+
 // Input of `codebooks`.
 struct TiedColors {
     // Number of Gaussians.
@@ -118,5 +132,7 @@ struct RelocationUniforms {
     moves: u32,
     // Four-vectors of the color of each Gaussian.
     stride: u32,
-    padding: vec2<u32>,
+    // 1: Gaussians that others get their colors from keep their moments.
+    keeps: u32,
+    padding: u32,
 }

@@ -23,6 +23,10 @@ pub(crate) struct TrainingArgs {
     /// Do not change Gaussians, and their state in the optimizer, in steps whose views do not show them.
     #[arg(long, help_heading = "Experimental")]
     sparse: bool,
+    /// Train an exposure for each camera: gains, mixtures and offsets of red, green and blue, for pictures whose cameras differ in exposure or
+    /// white balance. OUT has the mean exposure of the training cameras; exposures are not stored in it, and no evaluation uses them.
+    #[arg(long)]
+    exposure: bool,
     /// Background of images with transparent pixels: random, a random color for each view, or fixed, the background of training.
     #[arg(long, value_name = "WHAT", default_value = "random", value_parser = values::one_of(&BEHIND))]
     behind: Behind,
@@ -52,6 +56,7 @@ impl TrainingArgs {
                 ..Terms::default()
             },
             sparse: self.sparse,
+            exposure: self.exposure,
             behind: self.behind,
             patience: self.patience,
             seed: self.seed,

@@ -1,11 +1,11 @@
 //! Selecting training views.
 //!
-//! In: the training views of a dataset. Out: an even subset of the views, their distinct cameras, the number of their
-//! distinct times.
+//! In: the training views of a dataset. Out: an even subset of the views, their distinct cameras, the camera of each view, the
+//! number of their distinct times.
 
 use super::TrainingView;
 use crate::view::{Camera, Lens, RasterFov, View};
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 /// The fraction of the golden ratio: the fractions of its multiples are evenly distributed between 0 and 1.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
@@ -35,6 +35,16 @@ pub fn even_subset(views: &[TrainingView], wanted: usize) -> Vec<usize> {
 pub fn distinct_cameras(views: &[TrainingView]) -> Vec<Camera> {
     let mut seen = HashSet::new();
     views.iter().map(|view| view.camera).filter(|camera| seen.insert(identity(camera))).collect()
+}
+
+/// Returns the number of each view's camera among the [`distinct_cameras`].
+pub fn camera_numbers(views: &[TrainingView]) -> Vec<u32> {
+    let mut numbers = HashMap::new();
+    let mut number = |view: &TrainingView| {
+        let next = numbers.len() as u32;
+        *numbers.entry(identity(&view.camera)).or_insert(next)
+    };
+    views.iter().map(&mut number).collect()
 }
 
 pub(super) fn identity(camera: &Camera) -> ([u32; 16], [u32; 2], [u32; 5]) {
@@ -78,6 +88,16 @@ mod tests {
             correction: Default::default(),
         };
         (0..600).map(view).collect()
+    }
+
+    #[test]
+    fn views_of_one_camera_have_its_number() {
+        let views = views();
+        let mixed: Vec<_> = [40, 3, 59, 0, 599].map(|index| views[index].clone()).into();
+        assert_eq!(camera_numbers(&mixed), [0, 1, 0, 1, 2], "in the order of the views");
+        let numbers: Vec<u32> = (0..600).map(|index| index / 30).collect();
+        assert_eq!(camera_numbers(&views), numbers, "twenty cameras");
+        assert_eq!(distinct_cameras(&views).len(), 20, "the same cameras");
     }
 
     #[test]

@@ -114,16 +114,32 @@ impl Grower {
         parameters: &ParameterBuffers,
         seed: u64,
     ) -> Result<usize, GpuError> {
-        let ParameterBuffers { geometry, color, .. } = parameters;
-        let mut records: Vec<TrainedRecord> = bytemuck::pod_collect_to_vec(&geometry.read_values(headless)?);
+        let values = parameters.geometry.read_values(headless)?;
+        let mut records: Vec<TrainedRecord> = bytemuck::pod_collect_to_vec(&values);
         let moves = relocate(&mut records, seed);
+        self.apply(headless, parameters, &records, &moves, false);
+        Ok(moves.len())
+    }
+
+    /// Replaces the raw parameters, copies colors by these moves, and sets moments to 0: of where moves lead to, and of where they begin unless
+    /// `keeps`.
+    pub(super) fn apply(
+        &self,
+        headless: &Headless,
+        parameters: &ParameterBuffers,
+        records: &[TrainedRecord],
+        moves: &[[u32; 2]],
+        keeps: bool,
+    ) {
         if moves.is_empty() {
-            return Ok(0);
+            return;
         }
+        let ParameterBuffers { geometry, color, .. } = parameters;
         let context = headless.context();
-        let settings = RelocationUniforms { moves: moves.len() as u32, stride: color.stride, padding: [0; 2] };
-        context.queue.write_buffer(&geometry.values, 0, bytemuck::cast_slice(&records));
-        context.queue.write_buffer(&self.moves, 0, bytemuck::cast_slice(&moves));
+        let (count, stride) = (moves.len() as u32, color.stride);
+        let settings = RelocationUniforms { moves: count, stride, keeps: keeps.into(), padding: 0 };
+        context.queue.write_buffer(&geometry.values, 0, bytemuck::cast_slice(records));
+        context.queue.write_buffer(&self.moves, 0, bytemuck::cast_slice(moves));
         context.queue.write_buffer(&self.relocation_settings, 0, bytemuck::bytes_of(&settings));
         let label = wgpu::CommandEncoderDescriptor { label: Some("gs4d relocation") };
         let mut encoder = context.device.create_command_encoder(&label);
@@ -135,6 +151,5 @@ impl Grower {
             pass.dispatch_workgroups(threads.div_ceil(256).min(ADAM_GROUPS), 1, 1);
         }
         context.queue.submit([encoder.finish()]);
-        Ok(moves.len())
     }
 }

@@ -1,7 +1,7 @@
 //! What training from pictures alone does beside the steps of fine-tuning.
 //!
 //! In: the number of steps. Out: [`Growth`]: when Gaussians are relocated, how strong the noise is, how the rate of means falls, when the
-//! degrees of color rise.
+//! degrees of color rise; [`Cloning`]: when Gaussians are cloned, split and removed as in the original.
 
 use crate::gaussian::harmonics::evaluated;
 
@@ -31,6 +31,23 @@ pub struct Growth {
     pub dropout: f64,
     /// Least temporal scale of a Gaussian, as a share of the interval. Default: 0, any.
     pub least_time_scale: f64,
+    /// The densification of the original, in place of relocation; `None`, the default: the number of Gaussians stays.
+    pub cloning: Option<Cloning>,
+}
+
+/// The densification of the original, within a fixed number of places.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Cloning {
+    /// Most Gaussians.
+    pub capacity: usize,
+    /// Steps between two densifications.
+    pub every: usize,
+    /// The step after which they begin.
+    pub from: usize,
+    /// The step before which they and the resets of opacity end.
+    pub until: usize,
+    /// Steps between two resets of opacity. After the first, large Gaussians are removed.
+    pub reset_every: usize,
 }
 
 impl Growth {
@@ -45,7 +62,14 @@ impl Growth {
             raise_every: 1000.min(steps / 20).max(1),
             dropout: 0.1,
             least_time_scale: 0.0,
+            cloning: None,
         }
+    }
+
+    /// Returns the growth of the original over this number of steps, up to `capacity` Gaussians: without relocation, noise and dropout.
+    pub(crate) fn original(steps: usize, capacity: usize) -> Self {
+        let cloning = Some(Cloning::over(steps, capacity));
+        Self { relocate_every: None, noise: 0.0, dropout: 0.0, cloning, ..Self::over(steps) }
     }
 
     /// Returns whether Gaussians are relocated after this number of steps.
@@ -72,6 +96,39 @@ impl Growth {
     }
 }
 
+impl Cloning {
+    /// Returns the schedule of the original, whose 30,000 steps are scaled down to fewer, and not up to more.
+    fn over(steps: usize, capacity: usize) -> Self {
+        let reset_every = 3000.min(steps / 10).max(1);
+        Self { capacity, every: 100, from: 500.min(steps / 60), until: 15_000.min(steps / 2), reset_every }
+    }
+
+    /// Returns the number of Gaussians before the first step, which is a quarter of the capacity.
+    pub(crate) fn first(capacity: usize) -> usize {
+        capacity.div_ceil(4)
+    }
+
+    /// Returns whether gradients are added up in a step.
+    pub(super) fn adds_up(&self, step: usize) -> bool {
+        step < self.until
+    }
+
+    /// Returns whether Gaussians are cloned, split and removed after this number of steps.
+    pub(super) fn densifies_after(&self, step: usize) -> bool {
+        step.is_multiple_of(self.every.max(1)) && self.from < step && step < self.until
+    }
+
+    /// Returns whether large Gaussians are removed after this number of steps.
+    pub(super) fn removes_large_after(&self, step: usize) -> bool {
+        step > self.reset_every
+    }
+
+    /// Returns whether opacities are reset after this number of steps.
+    pub(super) fn resets_after(&self, step: usize) -> bool {
+        step.is_multiple_of(self.reset_every.max(1)) && step < self.until
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -90,6 +147,25 @@ mod tests {
         assert_eq!((steps.first(), steps.last(), steps.len()), (Some(&500), Some(&10_000), 96), "every hundred steps");
         let never = Growth { relocate_every: None, ..growth };
         assert!(!(0..12_000).any(|step| never.relocates_after(step)), "or never");
+    }
+
+    #[test]
+    fn the_original_densifies_in_the_first_half() {
+        let cloning = Cloning::over(30_000, 9);
+        let steps =
+            |is_due: &dyn Fn(usize) -> bool| -> Vec<usize> { (1..30_000).filter(|&step| is_due(step)).collect() };
+        let dense = steps(&|step| cloning.densifies_after(step));
+        assert_eq!((dense.first(), dense.last(), dense.len()), (Some(&600), Some(&14_900), 144), "every hundred steps");
+        let resets = steps(&|step| cloning.resets_after(step));
+        assert_eq!(resets, [3000, 6000, 9000, 12_000], "every three thousand");
+        let large = [3000, 3001].map(|step| cloning.removes_large_after(step));
+        assert_eq!(large, [false, true], "large ones after the first reset");
+        let short = Cloning::over(600, 9);
+        assert_eq!(
+            (short.from, short.until, short.reset_every),
+            (10, 300, 60),
+            "in proportion if there are fewer steps"
+        );
     }
 
     #[test]

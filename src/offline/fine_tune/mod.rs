@@ -6,18 +6,23 @@
 //! The best step is chosen on validation views, which are not trained on; without validation views, the last step is kept. The loss is `0.9 L1 + 0.1 (1 − SSIM)` unless set otherwise, with further [`Terms`]
 //! if these have weights, the optimizer Adam (section 6 of the 4DGS model). Views, backgrounds and rates of a step follow from its number
 //! alone, so that a run which is resumed ends as one which was not interrupted, but for rounding if sums are [atomic](GradientSums::Atomic).
-//! Training from pictures alone (`offline::train`) is the same with [`Growth`]: Gaussians that fade move to others.
+//! Training from pictures alone (`offline::train`) is the same with [`Growth`]: Gaussians that fade move to others, or, for comparison with the
+//! original, Gaussians are cloned, split and removed within a fixed capacity.
 //!
 //! If the scene is compressed, further steps train codebooks of color with everything else, on request on pictures of rounded geometry.
 
 pub(crate) mod adam;
 mod backward;
 mod best;
+pub(crate) mod cloner;
+pub(crate) mod cloning;
 mod coding;
 pub(crate) mod dropout;
 pub(crate) mod environment_backward;
+pub(crate) mod exposure;
 mod grower;
-mod growth;
+mod grown;
+pub(crate) mod growth;
 pub(crate) mod loss;
 pub(crate) mod neighbors;
 pub(crate) mod noise;
@@ -27,6 +32,7 @@ mod outcome;
 mod parameters;
 mod passes;
 mod phases;
+mod places;
 mod random_words;
 mod records;
 mod regularizer;
@@ -44,11 +50,13 @@ pub(crate) mod terms;
 mod tied;
 pub(crate) mod totals;
 mod trained_environment;
+mod trained_exposure;
 pub(crate) mod trainer;
 mod trainer_error;
 mod training;
 mod view_buffers;
 
+pub(crate) use growth::Cloning;
 pub use growth::Growth;
 pub(crate) use obstacle::obstacle;
 pub use outcome::{CurvePoint, FineTuned};

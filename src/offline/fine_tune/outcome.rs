@@ -50,4 +50,7 @@ pub struct FineTuned {
     pub validation: usize,
     /// Gradients that are not finite, which were left out; `None` if there are none.
     pub faults: Option<Faults>,
+    /// The exposure of each training camera, in the order of the views: for red, green and blue the factors on red, green and blue, and an
+    /// offset. The scene does not have them. Empty unless they were trained.
+    pub exposures: Vec<[[f32; 4]; 3]>,
 }

@@ -11,7 +11,7 @@ use crate::offline::layout::{FIRST_SEEN, TrainedRecord, TrainedScene};
 use crate::renderer::{GpuError, Headless};
 use wgpu::BufferUsages;
 
-/// Bytes of the notes of `project_backward` about gradients that are not finite, before a word for each Gaussian.
+/// Bytes of the notes of `project_backward` about gradients that are not finite, before two words for each Gaussian.
 const FAULT_BYTES: u64 = 4 * FIRST_SEEN as u64;
 
 /// Raw parameters and color coefficients, with their gradients, moments and notes.
@@ -21,7 +21,7 @@ pub(super) struct ParameterBuffers {
     pub color: Optimized,
     /// One [`TrainedScene`].
     pub scene_settings: wgpu::Buffer,
-    /// Gradients that were not finite; which Gaussians the views since the last step have shown.
+    /// Gradients that were not finite; how many views since the last step have shown each Gaussian, and its gradients on the screen.
     pub notes: wgpu::Buffer,
     /// Bind group of parameters and gradients, for `project_backward`.
     pub group: wgpu::BindGroup,
@@ -56,7 +56,7 @@ impl ParameterBuffers {
         let count = settings.count;
         let raw = allocator.buffer("gs4d trained", size_of_val(records) as u64, storage);
         queue.write_buffer(&raw, 0, bytemuck::cast_slice(records));
-        let notes = allocator.buffer("gs4d notes", FAULT_BYTES + 4 * u64::from(count), storage);
+        let notes = allocator.buffer("gs4d notes", FAULT_BYTES + 8 * u64::from(count), storage);
         let geometry = Optimized::new(headless, passes, &notes, raw, count, 5);
         let color = Optimized::new(headless, passes, &notes, harmonics.clone(), count, stride);
         let uniform = BufferUsages::UNIFORM;

@@ -3,7 +3,11 @@
 //! In: a scene, views and settings. Out: one step, one evaluation, the trained scene, the result of a run.
 
 use super::best::Progressed;
+use super::cloner::CloningStep;
+use super::grown::Grown;
+use super::growth::Cloning;
 use super::outcome::FineTuned;
+use super::places::{with_places, without_places};
 use super::sample::{GpuImage, Sample};
 use super::schedule::{Behind, Rates, Schedule, dropout_seed, noise_seed, relocation_seed};
 use super::settings::FineTuneSettings;
@@ -66,11 +70,21 @@ impl<'a> Run<'a> {
                 false => (None, Some(filter.segments)),
             });
         scene.filter = used;
+        let cloning = settings.growth.and_then(|growth| growth.cloning);
+        if let Some(Cloning { capacity, .. }) = cloning {
+            scene = with_places(&scene, capacity);
+        }
         let mut trainer = Trainer::with_sums(headless, scene, settings.mode, settings.sums)?;
         trainer.set_terms(settings.terms)?;
         trainer.set_sparse(settings.sparse);
+        if settings.exposure {
+            trainer.set_exposure(&images.cameras())?;
+        }
         if settings.growth.is_some() {
             trainer.set_growing()?;
+        }
+        if cloning.is_some() {
+            trainer.set_cloning()?;
         }
         let random = settings.behind == Behind::Random
             && background != Background::Environment
@@ -100,12 +114,16 @@ impl<'a> Run<'a> {
             steps_per_second: (steps > 0).then(|| steps as f64 / seconds),
             validation: self.images.validation.len(),
             faults: self.trainer.faults()?,
+            exposures: self.trainer.exposures()?,
         })
     }
 
     /// Returns the scene as it is, with its filter.
     pub(super) fn scene(&self) -> Result<GaussianScene, OfflineError> {
         let mut scene = self.trainer.scene()?;
+        if self.settings.growth.is_some_and(|growth| growth.cloning.is_some()) {
+            scene = without_places(scene);
+        }
         if let Some(segments) = self.support {
             let TrainedWith { time_interval, marginal_cutoff, .. } = scene.trained_with;
             let gaussians = sliced(&scene)?.into_owned().into_iter();
@@ -165,17 +183,34 @@ impl<'a> Run<'a> {
             noise: growth.noise,
             least_time_scale: growth.least_time_scale,
             seed: noise_seed(settings.seed, step),
+            adds_up: growth.cloning.is_some_and(|cloning| cloning.adds_up(step)),
         };
         Ok(self.trainer.step_growing(&Rates { mean, ..settings.rates }, factor, count, Some(of_step))?)
     }
 
-    /// Relocates the Gaussians that have faded, if that is due after this number of steps. Returns their number.
-    pub(super) fn relocate(&mut self, steps: usize) -> Result<usize, OfflineError> {
+    /// Relocates the Gaussians that have faded, or clones, splits and removes Gaussians and resets opacities, as far as that is due after this
+    /// number of steps.
+    pub(super) fn grow(&mut self, steps: usize) -> Result<Grown, OfflineError> {
         let settings = self.settings;
-        match settings.growth.is_some_and(|growth| growth.relocates_after(steps)) {
-            true => Ok(self.trainer.relocate(relocation_seed(settings.seed, steps))?),
-            false => Ok(0),
+        let mut grown = Grown::default();
+        let Some(growth) = settings.growth else { return Ok(grown) };
+        let seed = relocation_seed(settings.seed, steps);
+        if growth.relocates_after(steps) {
+            grown.relocated = self.trainer.relocate(seed)?;
         }
+        let Some(cloning) = growth.cloning else { return Ok(grown) };
+        if cloning.densifies_after(steps) {
+            let batch = settings.batch.min(self.images.len());
+            let step = CloningStep { batch, removes_large: cloning.removes_large_after(steps), seed };
+            let densified = self.trainer.densify(&step)?;
+            grown.cloned = densified.cloned;
+            grown.split = densified.split;
+            grown.removed = densified.removed;
+        }
+        if cloning.resets_after(steps) {
+            self.trainer.reset_opacity()?;
+        }
+        Ok(grown)
     }
 
     /// Returns the PSNR in dB of the scene in its present state: that of the squared error of all pixels, channels and validation views together;

@@ -24,6 +24,8 @@ pub struct Rates {
     pub harmonics: f64,
     /// Of the environment map; 0 keeps it as it is.
     pub environment: f64,
+    /// Of the exposures of cameras, if they are trained.
+    pub exposure: f64,
 }
 
 impl Rates {
@@ -37,6 +39,7 @@ impl Rates {
         color: 2.5e-3,
         harmonics: 1.25e-4,
         environment: 2.5e-3,
+        exposure: 1e-3,
     };
 
     /// Ours: the mean moves as fast as when training begins, since the Gaussians that are left spread into the place of the others.

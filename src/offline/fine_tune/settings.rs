@@ -26,6 +26,8 @@ pub struct FineTuneSettings {
     pub terms: Terms,
     /// Whether a step leaves Gaussians as they are that none of its views shows. Default: `false`.
     pub sparse: bool,
+    /// Whether a correction of color is trained for each camera: an exposure, which the scene does not have. Default: `false`.
+    pub exposure: bool,
     /// What is behind images that do not cover all of their pixels.
     pub behind: Behind,
     /// Seed of the order of views and of random backgrounds.
@@ -66,6 +68,7 @@ impl Default for FineTuneSettings {
             similarity_share: 0.1,
             terms: Terms::default(),
             sparse: false,
+            exposure: false,
             behind: Behind::default(),
             seed: 0,
             evaluate_every: 500,

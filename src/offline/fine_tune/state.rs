@@ -8,8 +8,9 @@ use crate::scene::TemporalFilter;
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct TrainerState {
     /// Raw parameters, their first and their second moments; the same of the color coefficients, of the environment map if there is one,
-    /// and of the entries of codebooks if colors
-    /// are [tied](super::Trainer::tie); then what rounding changes of each Gaussian, if geometry is [rounded](super::Trainer::round).
+    /// of the exposures of cameras if they are [trained](super::Trainer::set_exposure), and of the entries of codebooks if colors are
+    /// [tied](super::Trainer::tie); then what rounding changes of each Gaussian, if geometry is [rounded](super::Trainer::round), and the
+    /// sums of gradients on the screen, if the scene grows [as the original](super::Trainer::set_cloning).
     pub buffers: Vec<Vec<u8>>,
     /// The neighbors of each Gaussian; empty if no term needs them.
     pub neighbors: Vec<u8>,

@@ -2,6 +2,7 @@
 //!
 //! In: training views. Out: their images as one word for each pixel, decoded once, in parallel ([`TrainingImages`]).
 
+use crate::offline::dataset::selection::camera_numbers;
 use crate::offline::dataset::{CoveredImage, TrainingView};
 use crate::offline::memory_check::{BY_RESOLUTION, Pictures};
 use crate::offline::{OfflineError, Progress, proceed};
@@ -72,6 +73,11 @@ impl TrainingImages {
     /// Returns the views that are trained on, with their images.
     pub(crate) fn pairs(&self) -> impl Iterator<Item = (&View, &CoveredImage)> {
         self.shots.iter().map(|shot| (&shot.view, &shot.image))
+    }
+
+    /// Returns the camera of each view that is trained on, numbered from 0.
+    pub(super) fn cameras(&self) -> Vec<u32> {
+        camera_numbers(&self.views)
     }
 
     /// Returns the number of views that are trained on.

@@ -9,6 +9,7 @@
 //! | `rounding` | these records, what packing changes of each | the same, once geometry is [rounded](Trainer::round) |
 //! | the passes of the global sort | records, color | splats, pairs, picture |
 //! | `loss` | picture, image | gradients of pixels, sums |
+//! | `exposure` | picture, exposure of the camera | the picture that `loss` reads; gradients of exposures ([if trained](Trainer::set_exposure)) |
 //! | `blend_backward` | splats, pairs, gradients of pixels | gradients of pairs |
 //! | `environment_backward` | gradients of pixels, transmittance | gradients of the environment map, if the scene has one |
 //! | `project_backward` | gradients of pairs, parameters | gradients of raw parameters, added up over a batch; which Gaussians were seen |
@@ -16,10 +17,14 @@
 //! | `adam` | gradients, moments | parameters; of Gaussians that were seen only, if steps are [sparse](Trainer::set_sparse) |
 //! | `dropout` | the records of `slice` | the same, some without opacity, if Gaussians are [dropped](Trainer::drop_out) |
 //! | `noise` | raw parameters | the same with means moved at random and no too small temporal scale, if the scene [grows](Trainer::set_growing) |
+//! | `statistics` | views of a Gaussian, its gradients on the screen | sums over steps, if the scene [grows as the original](Trainer::set_cloning) |
 //! | `relocate` | moves, colors | colors of the Gaussians that move, moments, if the scene grows |
 //! | `codebooks` | gradients of coefficients; entries | gradients of entries; coefficients, once colors are [tied](Trainer::tie) |
 
 use super::backward::Backward;
+use super::cloner::{Cloner, CloningStep, reset, taken};
+use super::cloning::Densified;
+use super::exposure::Exposure;
 use super::grower::Grower;
 use super::optimized::{Extent, Optimized};
 use super::parameters::{ParameterBuffers, scene_settings};
@@ -35,6 +40,7 @@ use super::terms::Terms;
 use super::tied::Tied;
 use super::totals::{Faults, Totals};
 use super::trained_environment::TrainedEnvironment;
+use super::trained_exposure::TrainedExposure;
 use super::trainer_error::TrainerError;
 use crate::gaussian::harmonics::evaluated;
 use crate::gaussian::{GradientMode, Model};
@@ -62,6 +68,8 @@ pub struct StepGrowth {
     pub least_time_scale: f64,
     /// Seed of the noise.
     pub seed: u32,
+    /// Whether gradients are added up, if the scene [grows as the original](Trainer::set_cloning).
+    pub adds_up: bool,
 }
 
 /// A scene that is trained.
@@ -75,12 +83,14 @@ pub struct Trainer<'a> {
     parameters: ParameterBuffers,
     backward: Backward,
     environment: Option<TrainedEnvironment>,
+    exposure: Option<TrainedExposure>,
     tied: Option<Tied>,
     /// Weight of the term of the mask.
     mask_weight: f32,
     regularizer: Option<Regularizer>,
     rounder: Option<Rounder>,
     grower: Option<Grower>,
+    cloner: Option<Cloner>,
     sparse: bool,
     in_flight: VecDeque<wgpu::SubmissionIndex>,
 }
@@ -142,11 +152,13 @@ impl<'a> Trainer<'a> {
             parameters,
             backward,
             environment,
+            exposure: None,
             tied: None,
             mask_weight: 0.0,
             regularizer: None,
             rounder: None,
             grower: None,
+            cloner: None,
             sparse: false,
             in_flight: VecDeque::new(),
         };
@@ -212,12 +224,39 @@ impl<'a> Trainer<'a> {
         Ok(())
     }
 
+    /// Trains an exposure for each camera from now on, which is the identity at first, and corrects by it what the loss sees of the views of
+    /// that camera. `cameras` has the camera of each view, numbered from 0. Exposures are not part of the scene, and [`draw`](Self::draw) does
+    /// not use them.
+    ///
+    /// # Errors
+    /// A shader that does not compile.
+    pub fn set_exposure(&mut self, cameras: &[u32]) -> Result<(), GpuError> {
+        self.exposure = Some(TrainedExposure::new(self.headless, &self.passes, &self.parameters.notes, cameras)?);
+        Ok(())
+    }
+
+    /// Returns the exposures of all cameras; none unless they are [trained](Self::set_exposure).
+    ///
+    /// # Errors
+    /// A lost device.
+    pub fn exposures(&self) -> Result<Vec<Exposure>, GpuError> {
+        self.exposure.as_ref().map_or(Ok(Vec::new()), |exposure| exposure.exposures(self.headless))
+    }
+
+    /// Returns the gradients with respect to the exposures, accumulated since the last step.
+    ///
+    /// # Errors
+    /// A lost device.
+    pub fn exposure_gradients(&self) -> Result<Vec<Exposure>, GpuError> {
+        self.exposure.as_ref().map_or(Ok(Vec::new()), |exposure| exposure.gradients(self.headless))
+    }
+
     /// Adds the gradients of the loss of a batch, each view with the same share.
     ///
     /// # Errors
     /// A picture or pairs that do not fit the GPU, an image of another size than its view.
     pub fn accumulate(&mut self, batch: &[Sample<'_>], similarity_share: f64) -> Result<(), GpuError> {
-        let Self { headless, passes, capture, parameters, backward, environment, mask_weight, .. } = self;
+        let Self { headless, passes, capture, parameters, backward, environment, exposure, mask_weight, .. } = self;
         let share = 1.0 / batch.len().max(1) as f32;
         for sample in batch {
             if sample.image.size != sample.view.size {
@@ -242,7 +281,15 @@ impl<'a> Trainer<'a> {
             };
             queue.write_buffer(&buffers.loss_settings, 0, bytemuck::bytes_of(&settings));
             parameters.write_scene(queue, sample.number);
-            buffers.record(&mut encoder, headless, passes, capture, parameters, Some(sample.image));
+            let correction = match exposure {
+                Some(exposure) => exposure.correction(headless, passes, buffers, sample, share)?,
+                None => None,
+            };
+            match correction {
+                Some(correction) => correction.record_loss(&mut encoder, passes, buffers, sample.image),
+                None => buffers.record_loss(&mut encoder, passes, sample.image),
+            }
+            buffers.record(&mut encoder, headless, passes, capture, parameters);
             if let Some(environment) = environment.as_ref().filter(|_| sample.background == Background::Environment) {
                 environment.record_scatter(&mut encoder, headless, &buffers.pixel_gradients, sample.view.size);
             }
@@ -270,7 +317,7 @@ impl<'a> Trainer<'a> {
         queue.write_buffer(&buffers.depth_gradients, 0, bytemuck::cast_slice(depths));
         parameters.write_scene(queue, 0);
         let mut encoder = encoder(headless, "gs4d view");
-        buffers.record(&mut encoder, headless, passes, capture, parameters, None);
+        buffers.record(&mut encoder, headless, passes, capture, parameters);
         if let Some(environment) = environment.as_ref().filter(|_| background == Background::Environment) {
             environment.record_scatter(&mut encoder, headless, &buffers.pixel_gradients, view.size);
         }
@@ -329,6 +376,58 @@ impl<'a> Trainer<'a> {
         Ok(moved)
     }
 
+    /// Compiles the pass of the densification of the original, for a scene that [grows](Self::set_growing): for [`densify`](Self::densify).
+    ///
+    /// # Errors
+    /// A shader that does not compile.
+    pub fn set_cloning(&mut self) -> Result<(), GpuError> {
+        self.cloner = Some(Cloner::new(self.headless, &self.parameters)?);
+        Ok(())
+    }
+
+    /// Removes, clones and splits Gaussians by their gradients in the steps since the last call. Nothing is done unless the scene
+    /// [grows as the original](Self::set_cloning).
+    ///
+    /// # Errors
+    /// A lost device.
+    pub fn densify(&mut self, step: &CloningStep) -> Result<Densified, GpuError> {
+        let (Some(grower), Some(cloner)) = (&self.grower, &self.cloner) else { return Ok(Densified::default()) };
+        let extent = self.scene.trained_with.spatial_lr_scale;
+        let densified = cloner.densify(self.headless, &self.parameters, grower, extent, step)?;
+        self.slice();
+        Ok(densified)
+    }
+
+    /// Returns the mean gradient of each Gaussian on the screen in the steps since the last densification; none unless the scene
+    /// [grows as the original](Self::set_cloning).
+    ///
+    /// # Errors
+    /// A lost device.
+    pub fn screen_gradients(&self, batch: usize) -> Result<Vec<f32>, GpuError> {
+        self.cloner.as_ref().map_or(Ok(Vec::new()), |cloner| cloner.gradients(self.headless, batch))
+    }
+
+    /// Lowers all opacities to at most 0.01, as the original does from time to time.
+    ///
+    /// # Errors
+    /// A lost device.
+    pub fn reset_opacity(&mut self) -> Result<(), GpuError> {
+        reset(self.headless, &self.parameters)?;
+        self.slice();
+        Ok(())
+    }
+
+    /// Returns the number of Gaussians, without free places if the scene [grows as the original](Self::set_cloning).
+    ///
+    /// # Errors
+    /// A lost device.
+    pub fn taken(&self) -> Result<usize, GpuError> {
+        match &self.cloner {
+            Some(_) => taken(self.headless, &self.parameters),
+            None => Ok(self.count() as usize),
+        }
+    }
+
     /// Makes a step with the gradients accumulated so far, which become 0; the first `step` is 1.
     ///
     /// # Errors
@@ -349,7 +448,7 @@ impl<'a> Trainer<'a> {
         step: usize,
         growth: Option<StepGrowth>,
     ) -> Result<(), GpuError> {
-        let Self { headless, passes, parameters, environment, tied, sparse, .. } = &*self;
+        let Self { headless, passes, parameters, environment, exposure, tied, sparse, .. } = &*self;
         let ParameterBuffers { geometry, color, .. } = parameters;
         let colors = rates.of_harmonics(factor);
         let spatial_lr_scale = self.scene.trained_with.spatial_lr_scale;
@@ -378,12 +477,18 @@ impl<'a> Trainer<'a> {
             if let Some(environment) = environment {
                 environment.record_step(queue, &mut pass, passes, (rates.environment * factor) as f32, step);
             }
+            if let Some(exposure) = exposure {
+                exposure.record_step(queue, &mut pass, passes, (rates.exposure * factor) as f32, step);
+            }
             if let (Some(grower), Some(StepGrowth { noise, least_time_scale, seed, .. })) = (&self.grower, growth) {
                 let strength = (noise * rates.mean * spatial_lr_scale * factor) as f32;
                 let least = least_time_scale * f64::from(self.scene.trained_with.time_span());
                 let least_log_scale_t = least.max(f64::from(f32::MIN_POSITIVE)).ln() as f32;
                 let settings = NoiseUniforms { count: parameters.count(), seed, strength, least_log_scale_t };
                 grower.record_noise(queue, &mut pass, settings);
+            }
+            if let (Some(cloner), Some(StepGrowth { adds_up: true, .. })) = (&self.cloner, growth) {
+                cloner.record(&mut pass, parameters.count());
             }
             if let Some(tied) = tied {
                 tied.record_expand(&mut pass, passes, color);
@@ -565,9 +670,14 @@ impl<'a> Trainer<'a> {
     fn stored(&self) -> Vec<&wgpu::Buffer> {
         let ParameterBuffers { geometry, color, .. } = &self.parameters;
         let environment = self.environment.as_ref().map(|environment| &environment.values);
-        let all = [Some(geometry), Some(color), environment, self.tied.as_ref().map(|tied| &tied.entries)];
+        let exposure = self.exposure.as_ref().map(|exposure| &exposure.values);
+        let all = [Some(geometry), Some(color), environment, exposure, self.tied.as_ref().map(|tied| &tied.entries)];
         let optimized = all.into_iter().flatten().flat_map(Optimized::stored);
-        optimized.chain(self.rounder.as_ref().map(|rounder| &rounder.changes)).collect()
+        let others = [
+            self.rounder.as_ref().map(|rounder| &rounder.changes),
+            self.cloner.as_ref().map(|cloner| &cloner.statistics),
+        ];
+        optimized.chain(others.into_iter().flatten()).collect()
     }
 
     /// Sets all moments to 0, as before the first step.
@@ -577,6 +687,9 @@ impl<'a> Trainer<'a> {
         self.parameters.color.forget_moments(&mut encoder);
         if let Some(environment) = &self.environment {
             environment.values.forget_moments(&mut encoder);
+        }
+        if let Some(exposure) = &self.exposure {
+            exposure.values.forget_moments(&mut encoder);
         }
         self.headless.context().queue.submit([encoder.finish()]);
     }

@@ -3,6 +3,7 @@
 //! In: a run, optionally a stored state. Out: the best parameters, and the curve up to the last step.
 
 use super::best::{Best, Progressed};
+use super::grown::Grown;
 use super::outcome::CurvePoint;
 use super::resume::{Checkpoint, Saves};
 use super::run::Run;
@@ -48,7 +49,7 @@ pub(super) fn train(
     let first = curve.last().map_or(0, |last| last.step);
     progress.begin(settings.task(), settings.steps);
     (0..first).for_each(|_| progress.advance());
-    let (mut seconds, mut told, mut relocated) = (0.0, false, 0);
+    let (mut seconds, mut told, mut grown) = (0.0, false, Grown::default());
     let begun = Instant::now();
     let mut start = begun;
     let mut step = first;
@@ -60,7 +61,7 @@ pub(super) fn train(
         }
         run.step(step, step + 1, decay(step, settings.steps, settings.last_rate))?;
         step += 1;
-        relocated += run.relocate(step)?;
+        grown += run.grow(step)?;
         progress.advance();
         if !told && step.is_multiple_of(STEPS_OF_FAULTS) {
             told = run.tell_faults(progress)?;
@@ -81,14 +82,19 @@ pub(super) fn train(
         let (loss, training_psnr) = (Some(totals.loss), Some(totals.psnr));
         let point = CurvePoint { step, loss, training_psnr, psnr: run.evaluate()? };
         let speed = (step - first) as f64 / seconds;
-        let grown = settings.growth.map_or(String::new(), |_| {
+        let count = run.trainer.taken()?;
+        let growth = settings.growth.map_or(String::new(), |growth| {
             let left = begun.elapsed().as_secs_f64() * (settings.steps - step) as f64 / (step - first) as f64;
             let left = left.round() as u64;
-            let count = run.trainer.count();
-            format!(", {count} Gaussians, {relocated} relocated, {} min {} s left", left / 60, left % 60)
+            let Grown { relocated, cloned, split, removed } = grown;
+            let changes = match growth.cloning {
+                Some(_) => format!("{cloned} cloned, {split} split, {removed} removed"),
+                None => format!("{relocated} relocated"),
+            };
+            format!(", {count} Gaussians, {changes}, {} min {} s left", left / 60, left % 60)
         });
-        progress.note(&format!("{}{grown}", point.describe(Some(speed))));
-        relocated = 0;
+        progress.note(&format!("{}{growth}", point.describe(Some(speed))));
+        grown = Grown::default();
         curve.push(point);
         if point.psnr > best.point.psnr || point.psnr.is_none() {
             best = Best { point, state: run.trainer.state()? };

@@ -42,7 +42,10 @@ pub(super) struct ViewBuffers {
     size: UVec2,
     summed: GradientSums,
     pub loss_settings: wgpu::Buffer,
+    slopes: wgpu::Buffer,
     pub pixel_gradients: wgpu::Buffer,
+    tile_sums: wgpu::Buffer,
+    totals: wgpu::Buffer,
     pub depth_gradients: wgpu::Buffer,
     /// Those of pairs, or of splats if sums are atomic.
     gradients: wgpu::Buffer,
@@ -93,8 +96,6 @@ impl ViewBuffers {
         let gradients = storage("gs4d gradients of splats", needed);
         let color = wgpu::BindingResource::TextureView(frame.color);
         let whole = wgpu::Buffer::as_entire_binding;
-        let written = [&slopes, &pixel_gradients, &tile_sums, totals].map(whole);
-        let loss = [vec![whole(&loss_settings), color.clone()], written.to_vec()].concat();
         let buffers = frame.buffers;
         let read = [
             frame.frame,
@@ -116,20 +117,35 @@ impl ViewBuffers {
         let splats =
             [&parameters.scene_settings, &buffers.splats, &buffers.depth_keys, &first_pairs, &gradients].map(whole);
         let splat_gradients = [vec![instance], splats.to_vec()].concat();
+        let of_loss = [&loss_settings, &slopes, &pixel_gradients, &tile_sums, totals];
         Ok(Self {
             splats: buffers.splats.clone(),
             color: frame.color.clone(),
             size,
             summed,
-            loss: allocator.bind_group("gs4d loss", &passes.loss_group, &loss),
+            loss: bind_loss(headless, passes, of_loss, frame.color),
             blended: allocator.bind_group("gs4d blended", &passes.blended_group, &blended),
             sums: allocator.bind_group("gs4d sums", &passes.sums_group, &sums),
             splat_gradients: allocator.bind_group("gs4d splats", &passes.splats_group, &splat_gradients),
             loss_settings,
+            slopes,
             pixel_gradients,
+            tile_sums,
+            totals: totals.clone(),
             depth_gradients,
             gradients,
         })
+    }
+
+    /// Returns the bindings of the pass `loss` for a picture with these colors.
+    pub(super) fn loss_group(
+        &self,
+        headless: &Headless,
+        passes: &Passes,
+        color: &wgpu::TextureView,
+    ) -> wgpu::BindGroup {
+        let Self { loss_settings, slopes, pixel_gradients, tile_sums, totals, .. } = self;
+        bind_loss(headless, passes, [loss_settings, slopes, pixel_gradients, tile_sums, totals], color)
     }
 
     /// Returns whether the buffers were created for the resources of this frame and this size.
@@ -137,7 +153,32 @@ impl ViewBuffers {
         self.size == size && self.splats == frame.buffers.splats && self.color == *frame.color
     }
 
-    /// Records the passes after the picture, with the pass `loss` if there is an image.
+    /// Records the pass `loss`.
+    pub(super) fn record_loss(&self, encoder: &mut wgpu::CommandEncoder, passes: &Passes, image: &GpuImage) {
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+        self.dispatch_loss(&mut pass, passes, &self.loss, image);
+    }
+
+    /// Records the pass `loss` in a pass that has been begun, with the bindings of a picture.
+    pub(super) fn dispatch_loss(
+        &self,
+        pass: &mut wgpu::ComputePass<'_>,
+        passes: &Passes,
+        loss: &wgpu::BindGroup,
+        image: &GpuImage,
+    ) {
+        let tiles = tiles(self.size);
+        pass.set_bind_group(0, loss, &[]);
+        pass.set_bind_group(1, &image.group, &[]);
+        pass.set_pipeline(&passes.similarity);
+        pass.dispatch_workgroups(tiles.x, tiles.y, 1);
+        pass.set_pipeline(&passes.gradient);
+        pass.dispatch_workgroups(tiles.x, tiles.y, 1);
+        pass.set_pipeline(&passes.total);
+        pass.dispatch_workgroups(1, 1, 1);
+    }
+
+    /// Records the passes that turn the gradients of pixels into those of parameters.
     pub(super) fn record(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -145,7 +186,6 @@ impl ViewBuffers {
         passes: &Passes,
         capture: &GpuCapture,
         parameters: &ParameterBuffers,
-        image: Option<&GpuImage>,
     ) {
         let Some(frame) = headless.finished() else { return };
         let tiles = tiles(self.size);
@@ -153,16 +193,6 @@ impl ViewBuffers {
             encoder.clear_buffer(&self.gradients, 0, None);
         }
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-        if let Some(image) = image {
-            pass.set_bind_group(0, &self.loss, &[]);
-            pass.set_bind_group(1, &image.group, &[]);
-            pass.set_pipeline(&passes.similarity);
-            pass.dispatch_workgroups(tiles.x, tiles.y, 1);
-            pass.set_pipeline(&passes.gradient);
-            pass.dispatch_workgroups(tiles.x, tiles.y, 1);
-            pass.set_pipeline(&passes.total);
-            pass.dispatch_workgroups(1, 1, 1);
-        }
         pass.set_bind_group(0, &self.blended, &[]);
         pass.set_bind_group(1, &self.sums, &[]);
         if self.summed == GradientSums::Deterministic {
@@ -178,4 +208,16 @@ impl ViewBuffers {
         pass.set_bind_group(3, &parameters.group, &[]);
         pass.dispatch_workgroups(parameters.count().div_ceil(64), 1, 1);
     }
+}
+
+/// Returns the bindings of the pass `loss`, for a picture with these colors: its settings and what it writes, in the order of the shader.
+fn bind_loss(
+    headless: &Headless,
+    passes: &Passes,
+    [settings, written @ ..]: [&wgpu::Buffer; 5],
+    color: &wgpu::TextureView,
+) -> wgpu::BindGroup {
+    let read = [settings.as_entire_binding(), wgpu::BindingResource::TextureView(color)];
+    let resources = [&read[..], &written.map(wgpu::Buffer::as_entire_binding)].concat();
+    headless.allocator().bind_group("gs4d loss", &passes.loss_group, &resources)
 }

@@ -1,6 +1,7 @@
 //! Training a capture from nothing but the pictures of a dataset.
 //!
-//! In: training views with their images. Out: a scene in the trained form, with a fixed number of native 4D Gaussians.
+//! In: training views with their images. Out: a scene in the trained form, with a fixed number of native 4D Gaussians, or with at most as many
+//! if they are cloned, split and removed as in the original.
 //!
 //! | file | subject |
 //! |---|---|

@@ -63,7 +63,7 @@ impl Start {
 /// How a capture begins. Default: 60,000 Gaussians with the usual temporal scale, colors of degree 3, and degree 2 in time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StartSettings {
-    /// Number of Gaussians, which stays.
+    /// Number of Gaussians before the first step.
     pub gaussians: usize,
     /// Where their points come from.
     pub start: Start,

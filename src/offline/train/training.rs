@@ -53,6 +53,12 @@ impl TrainSettings {
         }
     }
 
+    /// Returns the most Gaussians that there are at any step.
+    pub(crate) fn capacity(&self) -> usize {
+        let cloning = self.tuning.growth.and_then(|growth| growth.cloning);
+        cloning.map_or(self.start.gaussians, |cloning| cloning.capacity.max(self.start.gaussians))
+    }
+
     /// Returns the usual settings for a dataset.
     pub fn usual(data: PathBuf, splits: SplitOptions) -> Self {
         let (capture, start) = (CaptureSettings::default(), StartSettings::default());
@@ -125,6 +131,7 @@ impl<'a> Training<'a> {
         out: &Path,
         progress: &mut dyn Progress,
     ) -> Result<TrainedCapture, OfflineError> {
+        let capacity = self.settings.capacity();
         let Self {
             settings: TrainSettings { start, tuning, save_every, .. },
             splits,
@@ -134,7 +141,7 @@ impl<'a> Training<'a> {
             key,
         } = self;
         TrainingImages::require_room(&splits.train, &splits.validation, headless)?;
-        require_room(headless, start.gaussians, start.degree, start.degree_t)?;
+        require_room(headless, capacity, start.degree, start.degree_t)?;
         let division = splits.to_string();
         let images = TrainingImages::load(splits.train, &splits.validation, &trained_with, progress)?;
         let (scene, started) = begin(&images, trained_with, playback, start)?;
