@@ -5,6 +5,7 @@
 use super::checkpoint::CheckpointError;
 use super::import::ImportError;
 use super::package::PackageError;
+use crate::gaussian::InvalidGaussian;
 use std::io;
 use std::path::PathBuf;
 
@@ -36,4 +37,7 @@ pub enum CodecErrorKind {
     /// A file of another make that cannot be read.
     #[error(transparent)]
     Import(#[from] ImportError),
+    /// A Gaussian that cannot be drawn.
+    #[error(transparent)]
+    Gaussian(#[from] InvalidGaussian),
 }

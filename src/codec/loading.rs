@@ -1,7 +1,7 @@
 //! A file in memory that is read in steps, for programs that must go on meanwhile, as a page in a browser.
 //!
-//! In: the name and the bytes of a file, and [`ReadOptions`]. Out: after some steps, a [`GaussianScene`]. Packages are read in small steps, files of
-//! other makes in one.
+//! In: the name and the bytes of a file, and [`ReadOptions`]. Out: after some steps, a [`GaussianScene`]; after some more, a [`RuntimeScene`]. Packages are
+//! read in small steps, files of other makes in one; all are converted in small steps.
 
 use super::error::{CodecError, CodecErrorKind};
 use super::format::{self, Format, Read};
@@ -10,8 +10,8 @@ use super::import::{ImportError, Imported};
 use super::options::ReadOptions;
 use super::package::{self, PackageError, Reading};
 use super::start::Start;
-use crate::scene::GaussianScene;
-use std::io::Cursor;
+use crate::scene::{Conversion, GaussianScene, RuntimeScene};
+use std::io::{self, Cursor};
 use std::path::{Path, PathBuf};
 
 /// A file that is being read.
@@ -43,6 +43,9 @@ enum State {
     Other(Vec<u8>, ReadBytes),
     /// Its scene.
     Read(Box<GaussianScene>),
+    Converting(Box<Conversion>),
+    /// A step has failed.
+    Failed,
 }
 
 type ReadBytes = fn(&Source<'_>, &ReadOptions) -> Result<Imported, ImportError>;
@@ -70,7 +73,31 @@ impl Loading {
                 self.state = State::Read(Box::new(read(&source, &self.options)?.scene));
                 Ok(true)
             }
-            State::Read(_) => Ok(false),
+            State::Read(_) | State::Converting(_) => Ok(false),
+            State::Failed => Err(failed()),
+        };
+        advance().map_err(|kind| CodecError { path: self.path.clone(), kind })
+    }
+
+    /// Does one step towards a scene that can be drawn: as [`advance`](Self::advance), then as [`GaussianScene::into_runtime`], about `bytes` at most.
+    /// Returns whether there is more to do.
+    ///
+    /// # Errors
+    /// As [`load`](super::load); a Gaussian that cannot be drawn.
+    pub fn advance_runtime(&mut self, bytes: usize) -> Result<bool, CodecError> {
+        if !matches!(self.state, State::Converting(_)) && self.advance(bytes)? {
+            return Ok(true);
+        }
+        let mut advance = || match std::mem::replace(&mut self.state, State::Failed) {
+            State::Converting(mut conversion) => {
+                let is_more = conversion.advance(bytes)?;
+                self.state = State::Converting(conversion);
+                Ok(is_more)
+            }
+            read => {
+                self.state = State::Converting(Box::new(Conversion::of(read.scene(&self.options)?)?));
+                Ok(true)
+            }
         };
         advance().map_err(|kind| CodecError { path: self.path.clone(), kind })
     }
@@ -80,23 +107,35 @@ impl Loading {
         match &self.state {
             State::Package(reading) => reading.progress(),
             State::Other(..) => 0.0,
-            State::Read(_) => 1.0,
+            State::Read(_) | State::Converting(_) | State::Failed => 1.0,
         }
     }
 
-    /// Does all remaining steps, and returns the scene.
+    /// Does all remaining steps, and returns the scene; in the form that is drawn, if its conversion has begun.
     ///
     /// # Errors
     /// As [`load`](super::load).
     pub fn finish(mut self) -> Result<GaussianScene, CodecError> {
         while self.advance(usize::MAX)? {}
-        let finish = || match self.state {
-            State::Package(reading) => Ok(reading.finish_with(&self.options)?),
-            State::Read(scene) => Ok(*scene),
-            State::Other(..) => Err(CodecErrorKind::UnknownFormat(format::unknown())),
-        };
-        finish().map_err(|kind| CodecError { path: self.path, kind })
+        self.state.scene(&self.options).map_err(|kind| CodecError { path: self.path, kind })
     }
+
+    /// Does all remaining steps, and returns the scene that can be drawn.
+    ///
+    /// # Errors
+    /// As [`advance_runtime`](Self::advance_runtime).
+    pub fn finish_runtime(mut self) -> Result<RuntimeScene, CodecError> {
+        while self.advance_runtime(usize::MAX)? {}
+        let scene = match self.state {
+            State::Converting(conversion) => conversion.finish().map_err(CodecErrorKind::from),
+            _ => Err(failed()),
+        };
+        scene.map_err(|kind| CodecError { path: self.path, kind })
+    }
+}
+
+fn failed() -> CodecErrorKind {
+    io::Error::other("a step before has failed").into()
 }
 
 impl State {
@@ -110,11 +149,23 @@ impl State {
             Some(Read::File(_) | Read::Folder(_)) | None => Err(CodecErrorKind::UnknownFormat(format::unknown())),
         }
     }
+
+    /// Returns the scene, once it has been read.
+    fn scene(self, options: &ReadOptions) -> Result<GaussianScene, CodecErrorKind> {
+        match self {
+            Self::Package(reading) => Ok(reading.finish_with(options)?),
+            Self::Read(scene) => Ok(*scene),
+            Self::Converting(conversion) => Ok(conversion.finish()?.into()),
+            Self::Other(..) | Self::Failed => Err(failed()),
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::synth::{SynthSettings, synthesize};
+    use crate::scene::{SceneForm, Trained};
 
     const BUNDLED: &[u8] = include_bytes!("../../assets/toybox.gs4d");
 
@@ -133,6 +184,48 @@ mod tests {
     fn a_package_that_is_read_in_steps_is_the_package() {
         let at_once = package::read(Cursor::new(BUNDLED)).expect("the bundled capture is intact");
         assert!(loading(BUNDLED).expect("it is read in steps") == at_once, "every value is the same");
+    }
+
+    #[test]
+    fn a_scene_that_is_converted_in_steps_is_the_scene() {
+        let synth = |degree| synthesize(&SynthSettings { count: 3000, degree, ..SynthSettings::default() });
+        let packages = [synth(0), synth(3)].map(|scene| {
+            let mut bytes = Vec::new();
+            package::write(&mut bytes, &scene, &package::WriteSettings::default()).expect("it can be written");
+            bytes
+        });
+        // Trained Gaussians, and packed ones with levels of detail.
+        for bytes in packages.iter().map(Vec::as_slice).chain([BUNDLED]) {
+            let loading = || Loading::new("it.gs4d", bytes.to_vec(), &ReadOptions::default()).expect("a package");
+            let at_once = package::read(Cursor::new(bytes)).expect("it is intact").into_runtime().expect("drawable");
+            for size in [1_000, 1 << 16, usize::MAX] {
+                let (mut stepped, mut steps) = (loading(), 0);
+                while stepped.advance_runtime(size).expect("it is intact") {
+                    steps += 1;
+                }
+                assert!(steps > 10 || size > 1 << 16, "{steps} steps of {size} bytes");
+                assert!(stepped.finish_runtime().expect("it is intact") == at_once, "every value is the same");
+            }
+            assert!(loading().finish_runtime().expect("it is intact") == at_once, "without a step, too");
+        }
+    }
+
+    #[test]
+    fn a_gaussian_that_cannot_be_drawn_is_named_when_it_is_converted() {
+        let mut scene = synthesize(&SynthSettings { count: 3000, ..SynthSettings::default() });
+        let SceneForm::Trained(Trained { parameters, .. }) = &mut scene.form else { panic!("a trained scene") };
+        parameters.rotation_l[2100] = [0.0; 4];
+        let mut bytes = Vec::new();
+        package::write(&mut bytes, &scene, &package::WriteSettings::default()).expect("it can be written");
+        let mut loading = Loading::new("it.gs4d", bytes, &ReadOptions::default()).expect("a package");
+        let refused = loop {
+            match loading.advance_runtime(1 << 14) {
+                Ok(is_more) => assert!(is_more, "it is refused"),
+                Err(error) => break error.to_string(),
+            }
+        };
+        assert!(refused.starts_with("it.gs4d: Gaussian 2100: "), "{refused}");
+        assert!(loading.advance_runtime(1).is_err() && loading.finish().is_err(), "it stays refused");
     }
 
     #[test]

@@ -4,26 +4,95 @@
 
 use std::io::{self, Cursor, Read};
 
-#[cfg(not(target_arch = "wasm32"))]
-type Inner = zstd::stream::read::Decoder<'static, Cursor<Vec<u8>>>;
 #[cfg(target_arch = "wasm32")]
-type Inner = ruzstd::decoding::StreamingDecoder<Cursor<Vec<u8>>, ruzstd::decoding::FrameDecoder>;
+use ruzstd::decoding::{BlockDecodingStrategy, FrameDecoder};
+
+/// Memory for a frame and its decompression, which the next one uses again.
+#[derive(Default)]
+pub(crate) struct Memory {
+    /// The bytes of the frame.
+    pub(crate) frame: Vec<u8>,
+    #[cfg(target_arch = "wasm32")]
+    decoder: FrameDecoder,
+}
+
+impl Memory {
+    /// Returns memory with the bytes of a frame.
+    fn of(frame: Vec<u8>) -> Self {
+        Self {
+            frame,
+            #[cfg(target_arch = "wasm32")]
+            decoder: FrameDecoder::new(),
+        }
+    }
+}
 
 /// The decompression of a frame.
-pub(crate) struct Decoder(Inner);
+pub(crate) struct Decoder {
+    #[cfg(not(target_arch = "wasm32"))]
+    inner: zstd::stream::read::Decoder<'static, Cursor<Vec<u8>>>,
+    #[cfg(target_arch = "wasm32")]
+    inner: FrameDecoder,
+    #[cfg(target_arch = "wasm32")]
+    frame: Cursor<Vec<u8>>,
+}
 
 impl Decoder {
     /// Begins to decompress a frame.
     ///
     /// # Errors
     /// Bytes that do not begin like a frame.
-    pub(crate) fn new(frame: Vec<u8>) -> io::Result<Self> {
-        let frame = Cursor::new(frame);
-        #[cfg(not(target_arch = "wasm32"))]
-        let inner = Inner::with_buffer(frame)?;
-        #[cfg(target_arch = "wasm32")]
-        let inner = Inner::new(frame).map_err(io::Error::other)?;
-        Ok(Self(inner))
+    #[cfg(not(target_arch = "wasm32"))]
+    pub(crate) fn new(memory: Memory) -> io::Result<Self> {
+        Ok(Self { inner: zstd::stream::read::Decoder::with_buffer(Cursor::new(memory.frame))? })
+    }
+
+    /// Begins to decompress a frame.
+    ///
+    /// # Errors
+    /// Bytes that do not begin like a frame.
+    #[cfg(target_arch = "wasm32")]
+    pub(crate) fn new(memory: Memory) -> io::Result<Self> {
+        let (mut inner, mut frame) = (memory.decoder, Cursor::new(memory.frame));
+        inner.reset(&mut frame).map_err(io::Error::other)?;
+        Ok(Self { inner, frame })
+    }
+
+    /// Decompresses bytes, and returns how many are in `to`: 0 while the frame refers back to all of them. `None` at its end.
+    #[cfg(not(target_arch = "wasm32"))]
+    fn some(&mut self, to: &mut [u8]) -> io::Result<Option<usize>> {
+        Ok(Some(self.inner.read(to)?).filter(|&count| count > 0))
+    }
+
+    /// Decompresses bytes, and returns how many are in `to`: 0 while the frame refers back to all of them. `None` at its end.
+    #[cfg(target_arch = "wasm32")]
+    fn some(&mut self, to: &mut [u8]) -> io::Result<Option<usize>> {
+        let (found, is_finished) = (self.inner.can_collect(), self.inner.is_finished());
+        if is_finished && found == 0 {
+            return Ok(None);
+        }
+        if !is_finished && found < to.len() {
+            let about = BlockDecodingStrategy::UptoBytes(to.len());
+            self.inner.decode_blocks(&mut self.frame, about).map_err(io::Error::other)?;
+        }
+        self.inner.read(to).map(Some)
+    }
+
+    /// Decompresses about as many bytes as `to` has. Returns how many of them are in `to`, which may be none while the frame refers back to them, and
+    /// whether it has ended.
+    ///
+    /// # Errors
+    /// A damaged frame.
+    pub(crate) fn advance(&mut self, to: &mut [u8]) -> io::Result<(usize, bool)> {
+        let mut filled = 0;
+        while let Some(rest) = to.get_mut(filled..).filter(|rest| !rest.is_empty()) {
+            match self.some(rest)? {
+                None => return Ok((filled, true)),
+                Some(0) => break,
+                Some(count) => filled += count,
+            }
+        }
+        Ok((filled, false))
     }
 
     /// Decompresses the next bytes until `to` is full or the frame ends; returns the number of bytes.
@@ -33,21 +102,25 @@ impl Decoder {
     pub(crate) fn fill(&mut self, to: &mut [u8]) -> io::Result<usize> {
         let mut filled = 0;
         while let Some(rest) = to.get_mut(filled..).filter(|rest| !rest.is_empty()) {
-            match self.0.read(rest)? {
-                0 => break,
-                count => filled += count,
+            let (count, has_ended) = self.advance(rest)?;
+            filled += count;
+            if has_ended {
+                break;
             }
         }
         Ok(filled)
     }
 
-    /// Returns the memory of the frame, for the next one.
-    pub(crate) fn into_frame(self) -> Vec<u8> {
-        #[cfg(not(target_arch = "wasm32"))]
-        let frame = self.0.finish();
-        #[cfg(target_arch = "wasm32")]
-        let frame = self.0.into_inner();
-        frame.into_inner()
+    /// Returns the memory, for the next frame.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub(crate) fn into_memory(self) -> Memory {
+        Memory { frame: self.inner.finish().into_inner() }
+    }
+
+    /// Returns the memory, for the next frame.
+    #[cfg(target_arch = "wasm32")]
+    pub(crate) fn into_memory(self) -> Memory {
+        Memory { frame: self.frame.into_inner(), decoder: self.inner }
     }
 }
 
@@ -56,7 +129,7 @@ impl Decoder {
 /// # Errors
 /// A damaged frame; one that holds more than `limit` bytes.
 pub(crate) fn decompress(frame: &[u8], limit: usize) -> io::Result<Vec<u8>> {
-    let mut decoder = Decoder::new(frame.to_vec())?;
+    let mut decoder = Decoder::new(Memory::of(frame.to_vec()))?;
     let mut bytes = vec![0; limit];
     let filled = decoder.fill(&mut bytes)?;
     if decoder.fill(&mut [0])? > 0 {
@@ -89,14 +162,14 @@ mod tests {
     fn a_frame_is_decompressed_in_pieces() {
         let bytes: Vec<u8> = (0..300_000u32).map(|i| (i.wrapping_mul(i) >> 7) as u8).collect();
         let frame = compress(&bytes, 3).expect("it is compressed");
-        let mut decoder = Decoder::new(frame.clone()).expect("a frame");
+        let mut decoder = Decoder::new(Memory::of(frame.clone())).expect("a frame");
         let mut found = vec![0; bytes.len()];
         for piece in found.chunks_mut(7_001) {
             assert_eq!(decoder.fill(piece).expect("intact"), piece.len(), "every piece is full");
         }
         assert!(found == bytes, "the bytes return");
         assert_eq!(decoder.fill(&mut [0]).expect("the end"), 0, "nothing follows");
-        assert_eq!(decoder.into_frame(), frame, "the memory of the frame returns");
+        assert_eq!(decoder.into_memory().frame, frame, "the memory of the frame returns");
     }
 
     #[test]
@@ -111,7 +184,7 @@ mod tests {
     fn a_damaged_frame_is_an_error() {
         let frame = compress(&[7; 10_000], 3).expect("it is compressed");
         let cut = frame[..frame.len() - 2].to_vec();
-        let read = |frame| Decoder::new(frame)?.fill(&mut [0; 20_000]);
+        let read = |frame| Decoder::new(Memory::of(frame))?.fill(&mut [0; 20_000]);
         assert!(read(cut).is_err(), "a frame that is cut off");
         assert!(read(b"no frame at all".to_vec()).is_err(), "other bytes");
     }

@@ -6,6 +6,7 @@ use super::lifespan::Lifespan;
 use super::parameters::{Model, Parameters};
 use glam::{DMat3, DMat4, DQuat, DVec3, DVec4, Vec3};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// One Gaussian in the runtime form: activated, sliced, capture space. 64 bytes; the record on the GPU is the same,
 /// except that it holds `1/σ_t` in place of `σ_t`.
@@ -82,10 +83,19 @@ impl Parameters {
     /// # Panics
     /// If an attribute of the model has fewer entries than there are means.
     pub fn slice(&self, settings: &SliceSettings) -> Result<Vec<Gaussian>, InvalidGaussian> {
+        self.slice_some(0..self.len(), settings)
+    }
+
+    /// Slices some Gaussians, as [`slice`](Self::slice) does.
+    pub(crate) fn slice_some(
+        &self,
+        range: Range<usize>,
+        settings: &SliceSettings,
+    ) -> Result<Vec<Gaussian>, InvalidGaussian> {
         let model = self.model();
-        let all: Vec<_> = (0..self.len()).into_par_iter().map(|i| self.slice_one(i, model, settings)).collect();
+        let some: Vec<_> = range.into_par_iter().map(|i| self.slice_one(i, model, settings)).collect();
         // Collected in order, so that the error names the first invalid Gaussian.
-        all.into_iter().collect()
+        some.into_iter().collect()
     }
 
     /// Returns the factor `L = R S` of the 4D covariance `L Lᵀ` of one Gaussian, axes x, y, z, t; the last is zero in a

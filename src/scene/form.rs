@@ -14,9 +14,10 @@
 
 use super::packed::{CodedColors, PackedColors, PackedScene};
 use super::sliced::Sliced;
-use crate::gaussian::{Gaussian, Harmonics, InvalidGaussian, Lifespan, Model, Parameters, SliceSettings};
+use crate::gaussian::{Gaussian, Harmonics, InvalidGaussian, Lifespan, Model, Parameters};
 use glam::Vec3;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// The Gaussians of a scene and their color.
 #[derive(Debug, Clone, PartialEq)]
@@ -130,29 +131,6 @@ impl SceneForm {
             Self::Trained(trained) => check_colors(&trained.harmonics, trained.parameters.len()),
             Self::Ready(form) => form.check_parts(),
         }
-    }
-
-    /// Converts to the form that is drawn: slices trained Gaussians. Colors are moved, not copied.
-    ///
-    /// # Errors
-    /// The first Gaussian that cannot be drawn, or has a color coefficient that is not finite.
-    pub(super) fn into_ready(self, settings: &SliceSettings) -> Result<Form, InvalidGaussian> {
-        let form = match self {
-            Self::Trained(Trained { parameters, harmonics }) => {
-                Form::Sliced(Sliced { gaussians: parameters.slice(settings)?, harmonics })
-            }
-            Self::Ready(form) => {
-                form.check()?;
-                form
-            }
-        };
-        if let Some(harmonics) = form.harmonics()
-            && let Some(bad) = harmonics.values.iter().position(|value| !value.is_finite())
-        {
-            let index = bad / (harmonics.coefficients * 3);
-            return Err(InvalidGaussian { index, reason: "a color coefficient that is not finite" });
-        }
-        Ok(form)
     }
 }
 
@@ -290,14 +268,11 @@ impl Form {
         }
     }
 
-    /// Checks that every Gaussian can be drawn.
-    fn check(&self) -> Result<(), InvalidGaussian> {
-        if let Self::Packed(packed) = self {
-            packed.check().map_err(|reason| InvalidGaussian { index: 0, reason })?;
-        }
+    /// Checks that each of some Gaussians can be drawn. The parts must fit together.
+    pub(super) fn check_some(&self, range: Range<usize>) -> Result<(), InvalidGaussian> {
         let reason = |index: usize| self.gaussian(index).check().err();
         let invalid = |index| Some(InvalidGaussian { index, reason: reason(index)? });
-        (0..self.len()).into_par_iter().find_map_first(invalid).map_or(Ok(()), Err)
+        range.into_par_iter().find_map_first(invalid).map_or(Ok(()), Err)
     }
 }
 

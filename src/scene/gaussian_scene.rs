@@ -1,14 +1,13 @@
 //! A capture in memory, as it is stored.
 //!
-//! In: the result of a codec. Out: a [`GaussianScene`], checked; converted for drawing, a [`RuntimeScene`].
+//! In: the result of a codec. Out: a [`GaussianScene`], checked.
 
 use super::environment::Environment;
 use super::filter::TemporalFilter;
 use super::form::{Form, SceneForm};
 use super::provenance::{PlaybackHints, TrainedWith};
 use super::runtime_scene::{Level, RuntimeScene, check_around, check_levels};
-use crate::gaussian::{InvalidGaussian, Model, SliceSettings};
-use std::sync::Arc;
+use crate::gaussian::Model;
 
 /// A capture in memory.
 #[derive(Debug, Clone, PartialEq)]
@@ -62,32 +61,6 @@ impl GaussianScene {
         check_around(self.len(), self.filter.as_ref(), self.environment.as_ref())?;
         check_levels(&self.levels, &self.trained_with, self.environment.is_some())
     }
-
-    /// Converts the scene for drawing: slices the Gaussians if they are in the trained form. Colors are moved, not
-    /// copied.
-    ///
-    /// # Errors
-    /// The first Gaussian that cannot be drawn, or has a color coefficient that is not finite.
-    pub fn into_runtime(self) -> Result<RuntimeScene, InvalidGaussian> {
-        let prefilter_var = self.trained_with.prefilter_var;
-        self.into_runtime_with(&SliceSettings { prefilter_var, ..SliceSettings::default() })
-    }
-
-    /// Converts as [`into_runtime`](Self::into_runtime) does, with slice settings other than the scene's own. They
-    /// apply to the trained form only.
-    ///
-    /// # Errors
-    /// The first Gaussian that cannot be drawn, or has a color coefficient that is not finite.
-    pub fn into_runtime_with(self, settings: &SliceSettings) -> Result<RuntimeScene, InvalidGaussian> {
-        Ok(RuntimeScene {
-            form: self.form.into_ready(settings)?,
-            environment: self.environment,
-            filter: self.filter,
-            trained_with: self.trained_with,
-            playback: self.playback,
-            levels: self.levels.into_iter().map(checked_level).collect::<Result<_, _>>()?,
-        })
-    }
 }
 
 impl From<RuntimeScene> for GaussianScene {
@@ -101,10 +74,4 @@ impl From<RuntimeScene> for GaussianScene {
             levels: scene.levels,
         }
     }
-}
-
-/// Returns a level of detail, after checking that each of its Gaussians can be drawn.
-fn checked_level(level: Level) -> Result<Level, InvalidGaussian> {
-    let scene = GaussianScene::from(Arc::unwrap_or_clone(level.scene)).into_runtime()?;
-    Ok(Level { scene: Arc::new(scene), ..level })
 }

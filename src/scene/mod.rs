@@ -5,6 +5,7 @@
 //! Gaussians may have.
 
 mod bounds;
+mod conversion;
 pub(crate) mod detail;
 mod environment;
 pub(crate) mod filter;
@@ -22,6 +23,7 @@ mod sliced;
 pub mod synth;
 
 pub use bounds::{Bounds, BoundsOverTime};
+pub(crate) use conversion::Conversion;
 pub(crate) use detail::MAX_LEVELS;
 pub use environment::Environment;
 pub(crate) use filter::MAX_SEGMENTS;

@@ -1,4 +1,5 @@
-//! Faults while a verb writes: killed at any moment, a folder that cannot be written to, a full disk, closed pipes, two runs at once.
+//! Faults while a verb writes: killed at any moment, a folder that cannot be written to, a full disk (by the limits of a shell, and in truth), closed
+//! pipes, two runs at once.
 //!
 //! In: every verb that writes, on small inputs made here. Out: proof that inputs are unchanged, that an output is absent, unchanged
 //! or complete and readable, and that the next run without a fault leaves no other files. Verbs that need a GPU are skipped where there is
@@ -11,6 +12,7 @@ use crate::support::dataset;
 use crate::support::folders::{contents, names};
 use crate::support::no_gpu::no_gpu;
 use crate::support::random::Random;
+use crate::support::skip::skip;
 use bevy_gs4d::codec::package::{self, WriteSettings};
 use bevy_gs4d::internal::codec::read_bytes;
 use bevy_gs4d::offline;
@@ -229,6 +231,23 @@ impl Act<'_> {
         command
     }
 
+    /// Returns the command with its outputs on a file system of its own, in memory, of which `free` bytes are free. It begins with the files of the
+    /// folder for outputs; its files are copied back there.
+    fn on_full_system(&self, free: u64) -> Command {
+        const SCRIPT: &str = "full=$1 old=$2 free=$3; shift 3
+            mount -t tmpfs -o size=1m none \"$full\" && cp \"$old\"/* \"$full\" || exit 1
+            cat /dev/zero >\"$full/filler\" 2>&-
+            truncate -s -\"$free\" \"$full/filler\"
+            \"$@\"; code=$?
+            rm \"$full/filler\"; cp -a \"$full/.\" \"$old\" && exit $code";
+        let full = self.stage.folder.path().join("full");
+        fs::create_dir_all(&full).expect("the folder can be written to");
+        let mut command = own_mounts();
+        command.args(["sh", "-c", SCRIPT, "sh"]).args([&full, &self.out]).args([&free.to_string(), GS4D]);
+        command.args(self.arguments(&full));
+        command
+    }
+
     /// Returns the common beginning of the names of its files.
     fn word(&self) -> &'static str {
         self.verb.files[0].split(['.', '_']).next().unwrap_or_default()
@@ -287,6 +306,13 @@ impl Act<'_> {
         let left: Vec<String> = names(&self.out).into_iter().filter(is_new).collect();
         assert!(left.is_empty(), "{} {context} leaves {left:?}", self.verb.name);
     }
+}
+
+/// Returns a command that runs another, given by its arguments, which may mount file systems: they end with it.
+fn own_mounts() -> Command {
+    let mut command = Command::new("unshare");
+    command.args(["--user", "--map-root-user", "--mount"]);
+    command
 }
 
 /// Returns whether an output is complete.
@@ -405,6 +431,33 @@ fn a_full_disk_is_named_and_the_old_output_stays() {
         act.check_inputs(act.verb.name);
         fs::remove_file(&device).expect("the file exists");
         act.run_well("to a file again");
+    }
+}
+
+#[test]
+fn a_full_file_system_is_named_and_the_old_output_stays() {
+    let stage = Stage::new();
+    let probe = own_mounts().args(["mount", "-t", "tmpfs", "none"]).arg(stage.folder.path()).output();
+    if !probe.is_ok_and(|probe| probe.status.success()) {
+        return skip("unshare cannot mount a file system: `apt-get install util-linux mount`, and user namespaces");
+    }
+    for act in stage.acts() {
+        act.run_well("at first");
+        let size = |file: &&str| fs::metadata(act.out.join(file)).expect("the file exists").len();
+        let largest = act.verb.files.iter().map(size).max();
+        // Full from the start, and in the middle of a file.
+        let free: &[u64] = if largest > Some(8192) { &[0, 4096] } else { &[0] };
+        for free in free {
+            act.put_old();
+            let before = names(&act.out);
+            let run = Run::of(&act.on_full_system(*free).output().expect("unshare starts"));
+            let context = format!("with {free} bytes free");
+            act.check_refused(&run, &context);
+            act.check_left(&before, &context);
+            let sentences = run.err.lines().filter(|line| line.contains(": no space is left on the disk")).count();
+            assert_eq!(sentences, 1, "{}: one sentence names the fault: {}", act.verb.name, run.err);
+        }
+        act.run_well("once there is room");
     }
 }
 

@@ -71,20 +71,34 @@ fn spawn(plan: &Value, job: &Value) -> Child {
     command(plan, job).stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the command starts")
 }
 
+/// Returns the jobs that may run when others are done.
+fn ready<'a>(plan: &'a Value, done: &BTreeSet<&str>) -> Vec<&'a Value> {
+    let may_run = |job: &&Value| {
+        let is_new = !done.contains(job["id"].as_str().expect("text"));
+        is_new && strings(&job["after"]).iter().all(|id| done.contains(id))
+    };
+    jobs(plan).iter().filter(may_run).collect()
+}
+
 /// Runs the jobs of a plan in a random order that it allows, each by `run`.
 fn run_all(plan: &Value, random: &mut Random, mut run: impl FnMut(&Value, &mut Random)) {
     let mut done = BTreeSet::new();
     while done.len() < jobs(plan).len() {
-        let may_run = |job: &&Value| {
-            let is_new = !done.contains(job["id"].as_str().expect("text"));
-            is_new && strings(&job["after"]).iter().all(|id| done.contains(id))
-        };
-        let ready: Vec<&Value> = jobs(plan).iter().filter(may_run).collect();
+        let ready = ready(plan, &done);
         let job = ready[random.below(ready.len())];
         run(job, random);
         let outputs = strings(&job["outputs"]);
         assert!(outputs.iter().all(|path| Path::new(path).is_file()), "{} writes {outputs:?}", job["id"]);
         done.insert(job["id"].as_str().expect("text"));
+    }
+}
+
+/// Runs jobs, each twice, all at once.
+fn run_twice_at_once(plan: &Value, jobs: &[&Value]) {
+    let both = jobs.iter().flat_map(|&job| [job, job]).map(|job| (job, spawn(plan, job))).collect::<Vec<_>>();
+    for (job, mut child) in both {
+        let code = child.wait().expect("the child can be waited for").code();
+        assert_eq!(code, Some(0), "both runs of {} end well", job["id"]);
     }
 }
 
@@ -126,10 +140,7 @@ fn jobs_in_any_order_give_the_bytes_of_a_bake() {
         let plan = capture.plan(&name, &[&BY_VIEWS[..], &["--shards", "3"]].concat());
         let mut random = Random::new(seed);
         run_all(&plan, &mut random, |job, _| {
-            // Twice at once, and once more.
-            let mut both = [spawn(&plan, job), spawn(&plan, job)];
-            let codes = both.each_mut().map(|child| child.wait().expect("the child can be waited for").code());
-            assert_eq!(codes, [Some(0); 2], "both runs of {} end well", job["id"]);
+            run_twice_at_once(&plan, &[job]);
             Run::of(&command(&plan, job).output().expect("the command starts")).text();
         });
         let out = capture.path(&format!("{name}.gs4d"));
@@ -140,6 +151,15 @@ fn jobs_in_any_order_give_the_bytes_of_a_bake() {
         assert!(fs::read(&out).expect("the package") == whole, "the bytes of a bake");
         assert!(!capture.path(&format!("{name}.gs4d.bake")).exists(), "the results are removed");
     }
+    // All jobs at once that may run, on as many workers.
+    let plan = capture.plan("waves", &[&BY_VIEWS[..], &["--shards", "3"]].concat());
+    let mut done = BTreeSet::new();
+    while done.len() < jobs(&plan).len() {
+        let ready = ready(&plan, &done);
+        run_twice_at_once(&plan, &ready);
+        done.extend(ready.iter().map(|job| job["id"].as_str().expect("text")));
+    }
+    assert!(fs::read(capture.path("waves.gs4d")).expect("the package") == whole, "the bytes of a bake");
 }
 
 #[test]
@@ -175,9 +195,7 @@ fn jobs_that_train_give_the_bytes_of_a_bake() {
     let whole = capture.path("whole.gs4d");
     gs4d(&capture.bake(&whole, &options)).text();
     let plan = capture.plan("jobs", &[&options[..], &["--shards", "2"]].concat());
-    run_all(&plan, &mut Random::new(7), |job, _| {
-        Run::of(&command(&plan, job).output().expect("the command starts")).text();
-    });
+    run_all(&plan, &mut Random::new(7), |job, _| run_twice_at_once(&plan, &[job]));
     let [whole, jobs] = [whole, capture.path("jobs.gs4d")].map(|path| fs::read(path).expect("the package"));
     assert!(whole == jobs, "the bytes of a bake");
 }

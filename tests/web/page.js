@@ -88,6 +88,21 @@ async function loading() {
   await player.close('loading');
 }
 
+// A large capture: its steps are as long as those of a small one.
+async function large() {
+  const player = await open('autoplay=0');
+  const { page, inside } = player;
+  const bytes = new Uint8Array(await (await fetch('/large.gs4d')).arrayBuffer());
+  const slices = [];
+  for (let i = 0; i < 3; i++) {
+    page.times.longestSlice = 0;
+    await page.openBytes('large.gs4d', bytes);
+    slices.push(page.times.longestSlice);
+  }
+  await post('large', { slices, gaussians: page.about.gaussians, long: inside.seen.long });
+  await player.close('large');
+}
+
 async function limits() {
   const player = await open('test=limits&autoplay=0');
   await post('limits', { ...player.inside.seen.limits, pictured: player.had('picture').length === 1, text: player.at('text').textContent });
@@ -278,7 +293,8 @@ async function phone(player) {
 // The same page with the Bevy app, if it is built.
 async function bevy(shots) {
   if (!(await fetch('/page/player_bevy.js')).ok) return;
-  const player = await open('engine=bevy&autoplay=0');
+  // In so small a picture an app draws a level of detail: here all Gaussians.
+  const player = await open('engine=bevy&autoplay=0&detail=8');
   for (const [index, shot] of shots.entries()) {
     if (shot.file !== '/page/toybox.gs4d') continue;
     Object.assign(player.frame.style, { width: `${shot.width}px`, height: `${shot.height}px` });
@@ -294,6 +310,7 @@ async function bevy(shots) {
 const shots = await (await fetch('shots.json')).json();
 try {
   await loading();
+  await large();
   await limits();
   await seeking();
   await messages();

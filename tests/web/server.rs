@@ -1,7 +1,7 @@
 //! The server of the pages.
 //!
-//! In: the folder of the built page, the pictures that are wanted, a function that opens an address in a browser. Out: what the page has posted, by
-//! name, once it has posted `end`.
+//! In: the folder of the built page, the pictures that are wanted, a large capture, a function that opens an address in a browser. Out: what the page has
+//! posted, by name, once it has posted `end`.
 
 use crate::browser::Browser;
 use crate::shots::{Shot, listed};
@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::path::Path;
+use std::sync::Arc;
 use std::sync::mpsc::{Sender, channel};
 use std::thread;
 use std::time::Duration;
@@ -23,7 +24,7 @@ const LIMIT: Duration = Duration::from_secs(240);
 const LONGEST: usize = 1 << 24;
 
 /// Serves the pages until they are done.
-pub fn serve(folder: &Path, shots: &[Shot], open: impl FnOnce(&str) -> Browser) -> Results {
+pub fn serve(folder: &Path, shots: &[Shot], large: Vec<u8>, open: impl FnOnce(&str) -> Browser) -> Results {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
     let address = format!("http://{}/test/page.html", listener.local_addr().expect("an address"));
     let (to, posted) = channel();
@@ -32,12 +33,13 @@ pub fn serve(folder: &Path, shots: &[Shot], open: impl FnOnce(&str) -> Browser) 
     files.insert("/test/page.js".into(), include_bytes!("page.js").to_vec());
     files.insert("/test/hooks.js".into(), include_bytes!("hooks.js").to_vec());
     files.insert("/test/shots.json".into(), listed(shots).into_bytes());
+    files.insert("/large.gs4d".into(), large);
     for shot in shots {
         if let Some(package) = &shot.package {
             files.insert(shot.file.clone(), package.clone());
         }
     }
-    let folder = folder.to_owned();
+    let (files, folder) = (Arc::new(files), folder.to_owned());
     // The thread ends with the process of the tests.
     thread::spawn(move || {
         for stream in listener.incoming().flatten() {

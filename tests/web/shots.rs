@@ -22,13 +22,8 @@ pub struct Shot {
     view: View,
     /// Expected colors, 8 bits a channel.
     pub expected: Vec<u8>,
-}
-
-impl Shot {
-    /// Returns whether it shows the bundled capture.
-    pub fn is_bundled(&self) -> bool {
-        self.package.is_none()
-    }
+    /// Those of an app, which anti-aliases, for the bundled capture.
+    pub of_app: Option<Vec<u8>>,
 }
 
 /// Returns all pictures.
@@ -53,14 +48,20 @@ pub fn all() -> Vec<Shot> {
         let size = UVec2::new(320, 180);
         let camera = Camera::look_at(core.center() + outward, core.center(), Vec3::Z, 0.9, size);
         let view = camera.view(time, toybox.trained_with.raster_fov);
-        shot(format!("toybox at {time}"), "/page/toybox.gs4d".into(), None, &toybox, view)
+        let of_app = Some(picture(&toybox, &view.antialiased(toybox.trained_with.pixel)));
+        let shot = shot(format!("toybox at {time}"), "/page/toybox.gs4d".into(), None, &toybox, view);
+        Shot { of_app, ..shot }
     });
     goldens.chain(bundled).collect()
 }
 
 fn shot(name: String, file: String, package: Option<Vec<u8>>, scene: &RuntimeScene, view: View) -> Shot {
-    let frame = reference::render(scene, &view, scene.trained_background());
-    Shot { name, file, package, view, expected: frame.picture.to_rgb8().into_raw() }
+    let expected = picture(scene, &view);
+    Shot { name, file, package, view, expected, of_app: None }
+}
+
+fn picture(scene: &RuntimeScene, view: &View) -> Vec<u8> {
+    reference::render(scene, view, scene.trained_background()).picture.to_rgb8().into_raw()
 }
 
 /// Returns the pictures as JSON, for the page.

@@ -168,28 +168,37 @@ function progress(part) {
   tell('progress', { part });
 }
 
-// Opens a file whose bytes a stream has. The capture that is shown stays if they are no capture.
+// Does a part of the loading, whose time counts.
+function slice(work) {
+  const start = performance.now();
+  const result = work(() => performance.now() - start < SLICE);
+  times.longestSlice = Math.max(times.longestSlice, performance.now() - start);
+  return result;
+}
+
+// Opens a file whose bytes a stream has; its length is 0 if it is not known. The capture that is shown stays if they are no capture.
 async function openStream(name, stream, length, own, address = null) {
   const reader = stream.getReader();
   try {
-    player.open(name);
+    slice(() => player.open(name, length));
     for (let received = 0; ; ) {
       const { done, value } = await reader.read();
       if (own !== turn) return void reader.cancel();
       if (done) break;
-      player.receive(value);
+      slice(() => player.receive(value));
       received += value.length;
       progress(length ? 0.7 * Math.min(1, received / length) : 0.35);
     }
     let found;
     while (!found) {
-      const start = performance.now();
-      do {
-        found = player.step();
-      } while (!found && performance.now() - start < SLICE);
-      times.longestSlice = Math.max(times.longestSlice, performance.now() - start);
+      found = slice((hasTime) => {
+        let step;
+        do step = player.step();
+        while (!step && !player.waits() && hasTime());
+        return step;
+      });
       progress(0.7 + 0.29 * player.progress());
-      await pause();
+      await (player.waits() ? new Promise((resolve) => setTimeout(resolve, 1)) : pause());
       if (own !== turn) return;
     }
     show(found, address);
@@ -429,6 +438,7 @@ async function begin() {
     // Software drivers are faster with the other design.
     const design = query.get('design') ?? (adapter.info?.isFallbackAdapter ? 'sort' : null);
     if (design) player.set_design?.(design);
+    player.set_detail?.(Number(query.get('detail')) || 0);
   } catch (error) {
     return refuse(`The player did not start: ${message(error)}`, 'Load the page again', () => location.reload());
   }

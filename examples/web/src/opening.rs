@@ -3,9 +3,9 @@
 //! In: the name of a file, then its bytes, piece by piece. Out: after some steps, a scene ready to draw; an error message for a file that cannot be read.
 
 use bevy_gs4d::codec::{CodecError, Loading, ReadOptions};
-use bevy_gs4d::scene::{GaussianScene, RuntimeScene};
+use bevy_gs4d::scene::RuntimeScene;
 
-/// Bytes that a step decompresses: a few milliseconds on a slow machine.
+/// Bytes that a step reads, decompresses or converts: a few milliseconds on a slow machine.
 const BYTES: usize = 1 << 16;
 
 /// A file that is being opened.
@@ -13,8 +13,7 @@ pub struct Opening(State);
 
 enum State {
     Receiving(String, Vec<u8>),
-    Reading(Loading),
-    Read(Box<GaussianScene>),
+    Reading(Box<Loading>),
     Empty,
 }
 
@@ -27,9 +26,13 @@ pub enum Step {
 }
 
 impl Opening {
-    /// Begins to open a file with this name.
-    pub fn new(name: &str) -> Self {
-        Self(State::Receiving(name.to_owned(), Vec::new()))
+    /// Begins to open a file with this name and, if it is known, length.
+    pub fn new(name: &str, length: usize) -> Self {
+        let mut bytes = Vec::new();
+        // Memory that is not written to yet costs nothing; a file that grows is copied in a step that takes long. What has no room is refused when
+        // it has been received.
+        let _ = bytes.try_reserve_exact(length);
+        Self(State::Receiving(name.to_owned(), bytes))
     }
 
     /// Adds bytes to the file.
@@ -54,19 +57,15 @@ impl Opening {
         match std::mem::replace(&mut self.0, State::Empty) {
             State::Receiving(name, bytes) => {
                 let loading = Loading::new(&name, bytes, &ReadOptions::default());
-                self.0 = State::Reading(loading.map_err(message)?);
+                self.0 = State::Reading(Box::new(loading.map_err(message)?));
                 Ok(Step::Part)
             }
             State::Reading(mut loading) => {
-                self.0 = match loading.advance(BYTES).map_err(message)? {
-                    true => State::Reading(loading),
-                    false => State::Read(Box::new(loading.finish().map_err(message)?)),
-                };
+                if !loading.advance_runtime(BYTES).map_err(message)? {
+                    return Ok(Step::Scene(Box::new(loading.finish_runtime().map_err(message)?)));
+                }
+                self.0 = State::Reading(loading);
                 Ok(Step::Part)
-            }
-            State::Read(scene) => {
-                let scene = scene.into_runtime().map_err(|error| error.to_string())?;
-                Ok(Step::Scene(Box::new(scene)))
             }
             State::Empty => Err("the file has been opened".to_owned()),
         }
@@ -77,7 +76,7 @@ impl Opening {
         match &self.0 {
             State::Receiving(..) => 0.0,
             State::Reading(loading) => loading.progress(),
-            State::Read(_) | State::Empty => 1.0,
+            State::Empty => 1.0,
         }
     }
 }

@@ -1,66 +1,51 @@
 //! The values of a scene in memory, as tables of words.
 //!
-//! In: a [`Header`] or a scene. Out: a blank scene of the header's size, and the 32-bit words of each attribute of a
+//! In: a [`Header`] or a scene. Out: a blank scene of the header's size, made at once or in steps, and the 32-bit words of each attribute of a
 //! scene.
 
 use super::header::{Header, StoredForm};
-use crate::gaussian::{Gaussian, Harmonics, Model, Parameters};
-use crate::scene::packed::{COLOR_WORDS, RECORD_WORDS};
+use crate::gaussian::{Harmonics, Model, Parameters};
 use crate::scene::{
     ActiveSets, CodedColors, Environment, Form, GaussianScene, PackedColors, PackedScene, SceneForm, Sliced,
     TemporalFilter, Trained,
 };
 use bytemuck::{Zeroable, cast_slice, cast_slice_mut};
 
-/// Returns a scene of the header's size with all values zero. The header must have been checked.
-pub(super) fn blank(header: &Header) -> GaussianScene {
-    let count = header.gaussians;
-    let harmonics = || Harmonics {
+/// Returns a scene of the header's form without values, which [`grow`] adds. The header must have been checked.
+pub(super) fn empty(header: &Header) -> GaussianScene {
+    let harmonics = Harmonics {
         coefficients: header.coefficients,
         degree: header.degree,
         degree_t: header.degree_t,
-        values: vec![0.0; count * header.coefficients * 3],
+        values: Vec::new(),
     };
     let form = match header.form {
-        StoredForm::Trained { model } => {
-            let timed = if model == Model::Static3d { 0 } else { count };
-            let pairs = if model == Model::Rotated4d { count } else { 0 };
-            let parameters = Parameters {
-                mean: vec![[0.0; 3]; count],
-                mean_t: vec![0.0; timed],
-                log_scale: vec![[0.0; 3]; count],
-                log_scale_t: vec![0.0; timed],
-                rotation_l: vec![[0.0; 4]; count],
-                rotation_r: vec![[0.0; 4]; pairs],
-                opacity_logit: vec![0.0; count],
-            };
-            SceneForm::Trained(Trained { parameters, harmonics: harmonics() })
-        }
-        StoredForm::Sliced => SceneForm::Ready(Form::Sliced(Sliced {
-            gaussians: vec![Gaussian::zeroed(); count],
-            harmonics: harmonics(),
-        })),
+        StoredForm::Trained { .. } => SceneForm::Trained(Trained { parameters: Parameters::default(), harmonics }),
+        StoredForm::Sliced => SceneForm::Ready(Form::Sliced(Sliced { gaussians: Vec::new(), harmonics })),
         StoredForm::Packed { codebooks } => SceneForm::Ready(Form::Packed(PackedScene {
-            records: vec![[0; RECORD_WORDS]; count],
-            ranges: vec![[0.0; 4]; PackedScene::range_count(count)],
+            records: Vec::new(),
+            ranges: Vec::new(),
             colors: match codebooks {
-                None => PackedColors::Whole(harmonics()),
-                Some(entries) => PackedColors::Coded(blank_colors(header, &entries)),
+                None => PackedColors::Whole(harmonics),
+                Some(entries) => PackedColors::Coded(CodedColors {
+                    degree: header.degree,
+                    degree_t: header.degree_t,
+                    entries: entries.into_iter().filter(|&entries| entries > 0).collect(),
+                    ..CodedColors::default()
+                }),
             },
         })),
     };
     GaussianScene {
         form,
         filter: header.filter.map(|filter| {
-            let words = TemporalFilter::words(count) * filter.segments as usize;
-            let bits = || ActiveSets::Bits(vec![0; words]);
-            let sets = if filter.bits { bits() } else { ActiveSets::Intervals(vec![0; count]) };
-            TemporalFilter { kind: filter.kind, segments: filter.segments, count, sets }
+            let sets = if filter.bits { ActiveSets::Bits(Vec::new()) } else { ActiveSets::Intervals(Vec::new()) };
+            TemporalFilter { kind: filter.kind, segments: filter.segments, count: header.gaussians, sets }
         }),
         environment: header.environment.map(|size| Environment {
             width: size.width,
             height: size.height,
-            texels: vec![0.0; 3 * size.width as usize * size.height as usize],
+            texels: Vec::new(),
         }),
         trained_with: header.trained_with.clone(),
         playback: header.playback,
@@ -68,16 +53,77 @@ pub(super) fn blank(header: &Header) -> GaussianScene {
     }
 }
 
-fn blank_colors(header: &Header, entries: &[u32]) -> CodedColors {
-    let entries: Vec<u32> = entries.iter().copied().filter(|&entries| entries > 0).collect();
-    let total: usize = entries.iter().map(|&entries| entries as usize).sum();
-    let mut colors = CodedColors { degree: header.degree, degree_t: header.degree_t, ..CodedColors::default() };
-    let words = colors.words_per_entry();
-    colors.records = vec![[0; COLOR_WORDS]; header.gaussians];
-    colors.codebooks = vec![0; total * words];
-    colors.scales = vec![[0.0; 4]; entries.len() * words];
-    colors.entries = entries;
-    colors
+/// Adds values of zero to an [`empty`] scene, about `bytes` at most. Returns whether it has the header's size.
+pub(super) fn grow(scene: &mut GaussianScene, header: &Header, bytes: usize) -> bool {
+    let (count, mut zeros) = (header.gaussians, Zeros { left: bytes, complete: true });
+    let colors = count * header.coefficients * 3;
+    match &mut scene.form {
+        SceneForm::Trained(Trained { parameters, harmonics }) => {
+            let model = match header.form {
+                StoredForm::Trained { model } => model,
+                StoredForm::Sliced | StoredForm::Packed { .. } => Model::Static3d,
+            };
+            let timed = if model == Model::Static3d { 0 } else { count };
+            zeros.fill(&mut parameters.mean, count);
+            zeros.fill(&mut parameters.mean_t, timed);
+            zeros.fill(&mut parameters.log_scale, count);
+            zeros.fill(&mut parameters.log_scale_t, timed);
+            zeros.fill(&mut parameters.rotation_l, count);
+            zeros.fill(&mut parameters.rotation_r, if model == Model::Rotated4d { count } else { 0 });
+            zeros.fill(&mut parameters.opacity_logit, count);
+            zeros.fill(&mut harmonics.values, colors);
+        }
+        SceneForm::Ready(Form::Sliced(Sliced { gaussians, harmonics })) => {
+            zeros.fill(gaussians, count);
+            zeros.fill(&mut harmonics.values, colors);
+        }
+        SceneForm::Ready(Form::Packed(packed)) => {
+            zeros.fill(&mut packed.records, count);
+            zeros.fill(&mut packed.ranges, PackedScene::range_count(count));
+            match &mut packed.colors {
+                PackedColors::Whole(harmonics) => zeros.fill(&mut harmonics.values, colors),
+                PackedColors::Coded(coded) => {
+                    let words = coded.words_per_entry();
+                    let entries: usize = coded.entries.iter().map(|&entries| entries as usize).sum();
+                    zeros.fill(&mut coded.records, count);
+                    zeros.fill(&mut coded.codebooks, entries * words);
+                    zeros.fill(&mut coded.scales, coded.entries.len() * words);
+                }
+            }
+        }
+    }
+    match scene.filter.as_mut().map(|filter| (filter.segments as usize, &mut filter.sets)) {
+        Some((segments, ActiveSets::Bits(words))) => zeros.fill(words, TemporalFilter::words(count) * segments),
+        Some((_, ActiveSets::Intervals(intervals))) => zeros.fill(intervals, count),
+        None => {}
+    }
+    if let Some(map) = &mut scene.environment {
+        zeros.fill(&mut map.texels, 3 * map.width as usize * map.height as usize);
+    }
+    zeros.complete
+}
+
+/// Zeros that may still be written, in bytes, and whether all tables so far have all of theirs.
+struct Zeros {
+    left: usize,
+    complete: bool,
+}
+
+impl Zeros {
+    /// Grows a table towards `count` rows, by one at least: a step may be smaller.
+    fn fill<T: Zeroable + Clone>(&mut self, table: &mut Vec<T>, count: usize) {
+        let (row, missing) = (size_of::<T>(), count.saturating_sub(table.len()));
+        let rows = if self.complete { missing.min((self.left / row).max(1)) } else { 0 };
+        if rows == count {
+            // Systems have memory of zeros.
+            *table = vec![T::zeroed(); count];
+        } else if rows > 0 {
+            table.reserve_exact(missing);
+            table.resize(table.len() + rows, T::zeroed());
+        }
+        self.left = self.left.saturating_sub(rows * row);
+        self.complete &= rows == missing;
+    }
 }
 
 /// Returns the table of words that contains the attribute of this name; empty if the scene has no such attribute. Words

@@ -1,17 +1,17 @@
 //! The reading of a package in steps, so that a program can go on between them.
 //!
-//! In: a reader that contains a package and nothing else. Out: after any number of steps, its scene. A step reads the bytes of a section,
-//! decompresses a piece of it, or writes a piece into the scene.
+//! In: a reader that contains a package and nothing else. Out: after any number of steps, its scene. A step makes room for a piece of the scene, reads
+//! a piece of a section, decompresses one, or writes one into the scene.
 
 use super::attribute::Attribute;
 use super::envelope;
 use super::error::PackageError;
 use super::header::{Header, LEVEL};
 use super::room::{Room, of_level};
-use super::section::Section;
+use super::section::{Body, Section};
 use super::{layout, options, planes};
 use crate::codec::options::ReadOptions;
-use crate::codec::zstd_frames::Decoder;
+use crate::codec::zstd_frames::{Decoder, Memory};
 use crate::scene::{GaussianScene, Level, RuntimeScene, SceneForm};
 use std::io::{BufReader, Cursor, Read, Seek};
 use std::sync::Arc;
@@ -31,11 +31,14 @@ struct Sections {
     header: Header,
     attributes: Vec<Attribute>,
     scene: GaussianScene,
-    /// Index of the next section, and the one that is being decompressed.
+    /// Whether the scene has all of its values, which are zero until they have been read.
+    is_grown: bool,
+    /// Index of the next section, and what has been begun: its body, or the decompression of the section before.
     next: usize,
+    body: Option<Body>,
     begun: Option<Begun>,
     /// Memory of the bytes of a section, compressed and decompressed.
-    body: Vec<u8>,
+    memory: Memory,
     planes: Vec<u8>,
 }
 
@@ -44,8 +47,7 @@ struct Begun {
     section: usize,
     attribute: usize,
     decoder: Decoder,
-    /// Bytes decompressed, and rows written into the scene.
-    decoded: usize,
+    /// Rows written into the scene.
     joined: usize,
 }
 
@@ -68,7 +70,7 @@ impl<R: Read + Seek> Reading<R> {
         let mut reader = BufReader::new(reader);
         let (header, file_length) = envelope::read(&mut reader)?;
         let room = Room::of(&header, file_length);
-        Ok(Self { reader, room, sections: Sections::new(header)?, level: None, levels: Vec::new() })
+        Ok(Self { reader, room, sections: Sections::new(header), level: None, levels: Vec::new() })
     }
 
     /// Does one step, which decompresses or writes about `bytes` at most. Returns whether there is more to do.
@@ -91,7 +93,7 @@ impl<R: Read + Seek> Reading<R> {
                 let (header, start) = self.room.header_of_level(&body).map_err(of_level(index))?;
                 let mut body = Cursor::new(body);
                 body.set_position(start);
-                self.level = Some((body, Sections::new(header).map_err(of_level(index))?));
+                self.level = Some((body, Sections::new(header)));
                 Ok(true)
             }
             Step::None => Ok(false),
@@ -100,13 +102,13 @@ impl<R: Read + Seek> Reading<R> {
 
     /// Returns the part of the sections that has been read, 0 to 1.
     pub(crate) fn progress(&self) -> f32 {
-        let Sections { header, next, begun, .. } = &self.sections;
+        let Sections { header, next, begun, planes, .. } = &self.sections;
         let length = |section: &Section| section.length as f64;
         let all: f64 = header.sections.iter().map(length).sum();
         let read: f64 = header.sections.iter().take(*next).map(length).sum();
         let left = begun.as_ref().and_then(|begun| {
             let section = header.sections.get(begun.section)?;
-            Some(length(section) * (1.0 - begun.decoded as f64 / section.raw_length.max(1) as f64))
+            Some(length(section) * (1.0 - planes.len() as f64 / section.raw_length.max(1) as f64))
         });
         ((read - left.unwrap_or(0.0)) / all.max(1.0)) as f32
     }
@@ -136,32 +138,47 @@ impl<R: Read + Seek> Reading<R> {
 }
 
 impl Sections {
-    /// Creates a blank scene for the sections of a checked header.
-    fn new(header: Header) -> Result<Self, PackageError> {
-        let scene = layout::blank(&header);
-        // Values are written at positions from the header: the tables must have the sizes of the header.
-        header.check_scene(&scene)?;
-        let attributes = header.attributes();
-        let (body, planes) = Default::default();
-        Ok(Self { header, attributes, scene, next: 0, begun: None, body, planes })
+    /// Creates an empty scene for the sections of a checked header.
+    fn new(header: Header) -> Self {
+        let (scene, attributes) = (layout::empty(&header), header.attributes());
+        let (is_grown, next, body, begun, memory, planes) = Default::default();
+        Self { header, attributes, scene, is_grown, next, body, begun, memory, planes }
     }
 
     /// Does one step with about `bytes`.
     fn advance(&mut self, reader: &mut impl Read, bytes: usize) -> Result<Step, PackageError> {
+        let bytes = bytes.max(1);
+        if !self.is_grown {
+            if !layout::grow(&mut self.scene, &self.header, bytes) {
+                return Ok(Step::Part);
+            }
+            // Values are written at positions from the header: the tables must have the sizes of the header.
+            self.header.check_scene(&self.scene)?;
+            self.is_grown = true;
+        }
         if self.begun.is_some() {
             self.advance_begun(bytes)?;
             return Ok(Step::Part);
         }
         let Some(section) = self.header.sections.get(self.next) else { return Ok(Step::None) };
-        section.read_body(reader, &mut self.body)?;
+        let frame = &mut self.memory.frame;
+        let mut body = match self.body.take() {
+            Some(body) => body,
+            None => section.begin_body(reader, frame)?,
+        };
+        if !section.read_some(reader, &mut body, frame, bytes)? {
+            self.body = Some(body);
+            return Ok(Step::Part);
+        }
         self.next += 1;
         if let Some(attribute) = self.attributes.iter().position(|attribute| attribute.name == section.name) {
             self.planes.clear();
-            self.planes.resize(section.raw_length, 0);
-            let decoder = Decoder::new(std::mem::take(&mut self.body)).map_err(|e| damaged(section, e.to_string()))?;
-            self.begun = Some(Begun { section: self.next - 1, attribute, decoder, decoded: 0, joined: 0 });
+            self.planes.reserve(section.raw_length);
+            let memory = std::mem::take(&mut self.memory);
+            let decoder = Decoder::new(memory).map_err(|e| damaged(section, e.to_string()))?;
+            self.begun = Some(Begun { section: self.next - 1, attribute, decoder, joined: 0 });
         } else if section.name == LEVEL {
-            return Ok(Step::Level(std::mem::take(&mut self.body)));
+            return Ok(Step::Level(std::mem::take(&mut self.memory.frame)));
         }
         Ok(Step::Part)
     }
@@ -171,16 +188,17 @@ impl Sections {
         let Some(begun) = &mut self.begun else { return Ok(()) };
         let Some(section) = self.header.sections.get(begun.section) else { return Ok(()) };
         let Some(attribute) = self.attributes.get(begun.attribute) else { return Ok(()) };
-        if begun.decoded < section.raw_length {
-            let end = section.raw_length.min(begun.decoded.saturating_add(bytes.max(1)));
-            let piece = self.planes.get_mut(begun.decoded..end).unwrap_or_default();
-            let found = begun.decoder.fill(piece).map_err(|e| damaged(section, e.to_string()))?;
-            begun.decoded += found;
-            if found < piece.len() {
-                let reason = format!("it holds {} bytes instead of {}", begun.decoded, section.raw_length);
-                return Err(damaged(section, reason));
-            }
-            return Ok(());
+        let decoded = self.planes.len();
+        if decoded < section.raw_length {
+            self.planes.resize(section.raw_length.min(decoded.saturating_add(bytes)), 0);
+            let piece = self.planes.get_mut(decoded..).unwrap_or_default();
+            let (count, has_ended) = begun.decoder.advance(piece).map_err(|e| damaged(section, e.to_string()))?;
+            let decoded = decoded + count;
+            self.planes.truncate(decoded);
+            return match has_ended {
+                false => Ok(()),
+                true => Err(damaged(section, format!("it holds {decoded} bytes instead of {}", section.raw_length))),
+            };
         }
         if begun.joined < section.count {
             let rows = (bytes / (attribute.width * 4).max(1)).max(1);
@@ -198,7 +216,7 @@ impl Sections {
             return Err(damaged(section, format!("it holds more than {} bytes", section.raw_length)));
         }
         if let Some(begun) = self.begun.take() {
-            self.body = begun.decoder.into_frame();
+            self.memory = begun.decoder.into_memory();
         }
         Ok(())
     }

@@ -79,22 +79,53 @@ pub(super) fn write_body(writer: &mut impl Write, body: &[u8]) -> Result<(), Pac
     Ok(writer.write_all(body)?)
 }
 
+/// A body of which a part has been read.
+pub(super) struct Body {
+    /// The length before it.
+    length: u64,
+    hasher: crc32fast::Hasher,
+}
+
 impl Section {
-    /// Reads the length and the body, and checks both. If one is wrong, the reader is still positioned after the body.
-    pub(super) fn read_body(&self, reader: &mut impl Read, body: &mut Vec<u8>) -> Result<(), PackageError> {
+    /// Reads the length before the body, which [`read_some`](Self::read_some) then reads into `body`.
+    pub(super) fn begin_body(&self, reader: &mut impl Read, body: &mut Vec<u8>) -> Result<Body, PackageError> {
         let mut prefix = [0; 8];
         reader.read_exact(&mut prefix)?;
-        // The table has been checked against the length of the file.
         body.clear();
-        body.resize(self.length, 0);
-        reader.read_exact(body)?;
-        let (expected, found) = (self.length as u64, u64::from_le_bytes(prefix));
+        // The table has been checked against the length of the file.
+        body.reserve(self.length);
+        Ok(Body { length: u64::from_le_bytes(prefix), hasher: crc32fast::Hasher::new() })
+    }
+
+    /// Reads at most `bytes` more of the body. Returns whether it is complete; then the length before it and the checksum have been checked.
+    pub(super) fn read_some(
+        &self,
+        reader: &mut impl Read,
+        begun: &mut Body,
+        body: &mut Vec<u8>,
+        bytes: usize,
+    ) -> Result<bool, PackageError> {
+        let start = body.len();
+        body.resize(self.length.min(start.saturating_add(bytes)), 0);
+        let piece = body.get_mut(start..).unwrap_or_default();
+        reader.read_exact(piece)?;
+        begun.hasher.update(piece);
+        if body.len() < self.length {
+            return Ok(false);
+        }
+        let (expected, found) = (self.length as u64, begun.length);
         if expected != found {
             return Err(PackageError::SectionLength { name: self.name.clone(), expected, found });
         }
-        if crc32fast::hash(body) != self.crc32 {
+        if begun.hasher.clone().finalize() != self.crc32 {
             return Err(PackageError::SectionChecksum { name: self.name.clone() });
         }
-        Ok(())
+        Ok(true)
+    }
+
+    /// Reads the length and the body, and checks both. If one is wrong, the reader is still positioned after the body.
+    pub(super) fn read_body(&self, reader: &mut impl Read, body: &mut Vec<u8>) -> Result<(), PackageError> {
+        let mut begun = self.begin_body(reader, body)?;
+        self.read_some(reader, &mut begun, body, usize::MAX).map(drop)
     }
 }

@@ -268,6 +268,7 @@ impl From<CodecErrorKind> for CaptureLoadError {
             CodecErrorKind::Checkpoint(error) => Self::Checkpoint(error),
             CodecErrorKind::Package(error) => Self::Package(error),
             CodecErrorKind::Import(error) => Self::Import(error),
+            CodecErrorKind::Gaussian(error) => Self::Gaussian(error),
         }
     }
 }

@@ -1,7 +1,8 @@
 //! URLs in place of files, run as a user runs them.
 //!
 //! In: an S3 server on loopback with small captures, and faults of the network. Out: proof that verbs read and write URLs as they do files, that
-//! what has not changed is not fetched again, that single faults are survived and lasting ones reported in a sentence, and that no output is lost.
+//! what has not changed is not fetched again, that single faults are survived and lasting ones reported in a sentence, a server that is lost at any
+//! request or hangs as well, and that no output is lost.
 
 mod server;
 
@@ -12,7 +13,7 @@ use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use glam::{UVec2, Vec3};
 use serde_json::Value;
 use server::{Fault, Server};
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -20,12 +21,31 @@ use tempfile::TempDir;
 
 /// Runs the command with a cache of its own and the store of a server.
 fn run(server: &Server, cache: &TempDir, arguments: &[OsString]) -> Run {
+    Run::of(&command(server, cache, arguments).output().expect("the command starts"))
+}
+
+fn command(server: &Server, cache: &TempDir, arguments: &[OsString]) -> Command {
     let mut command = Command::new(GS4D);
     command.args(arguments).env("GS4D_CACHE", cache.path()).env("AWS_ENDPOINT", format!("http://{}", server.address));
     let variables =
         [("ACCESS_KEY_ID", "id"), ("SECRET_ACCESS_KEY", "key"), ("ALLOW_HTTP", "true"), ("REGION", "us-east-1")];
     command.envs(variables.map(|(name, value)| (format!("AWS_{name}"), value)));
-    Run::of(&command.output().expect("the command starts"))
+    command
+}
+
+/// Checks that a run failed with one sentence about a URL.
+fn check_sentence(run: &Run, url: &str) {
+    run.must_fail(&format!("{url}: "));
+    let sentences: Vec<&str> = run.err.lines().filter(|line| line.starts_with("error:")).collect();
+    assert_eq!(sentences.len(), 1, "one line: {}", run.err);
+}
+
+/// Checks that a complete output is kept on this machine, and no part of a file.
+fn check_kept(cache: &TempDir, expected: &[u8]) {
+    let kept = contents(&cache.path().join("outputs"));
+    assert!(kept.values().any(|bytes| bytes == expected), "the output is kept, complete: {:?}", kept.keys());
+    let all = contents(cache.path());
+    assert!(all.keys().all(|path| path.extension().is_none_or(|e| e != "part")), "no temporary file: {:?}", all.keys());
 }
 
 fn read(path: &Path) -> Vec<u8> {
@@ -160,9 +180,7 @@ fn lasting_faults_are_reported_in_a_sentence_and_no_output_is_lost() {
     let fails = |method, name: &str, fault, words: &[&str]| {
         server.inject(method, name, fault, 1000);
         let run = run(&server, &cache, &convert);
-        run.must_fail(&format!("s3://bucket/{name}: "));
-        let sentences: Vec<&str> = run.err.lines().filter(|line| line.starts_with("error:")).collect();
-        assert_eq!(sentences.len(), 1, "one line: {}", run.err);
+        check_sentence(&run, &format!("s3://bucket/{name}"));
         for words in words {
             assert!(run.err.contains(words), "{words:?} in {}", run.err);
         }
@@ -171,12 +189,56 @@ fn lasting_faults_are_reported_in_a_sentence_and_no_output_is_lost() {
     fails("GET", "in.gs4d", Fault::CutAfter(700), &["run the command again"]);
     fails("PUT", "out.gs4d", Fault::Fails, &["check the network", "the output is complete in"]);
     assert_eq!(server.get("out.gs4d").as_deref(), Some(b"before".as_slice()), "the object is unchanged");
-    let kept = contents(&cache.path().join("outputs"));
-    assert!(kept.values().any(|bytes| *bytes == read(&input)), "the output is kept, complete: {:?}", kept.keys());
-    assert!(
-        contents(cache.path()).keys().all(|path| path.extension().is_none_or(|e| e != "part")),
-        "no temporary file"
-    );
+    check_kept(&cache, &read(&input));
+}
+
+#[test]
+fn a_server_that_is_lost_at_any_request_is_named_and_nothing_is_lost() {
+    let Some(server) = Server::start() else { return };
+    let (folder, cache) = (folder(), folder());
+    let (small, large) = (scene(&folder, "60"), folder.path().join("large.gs4d"));
+    gs4d(&arguments!["synth", &large, "--count", "70000", "--level", "1"]).text();
+    server.put("in.gs4d", &read(&small));
+    server.put("out.gs4d", b"before");
+    let convert = |input: &OsStr, more: &[&str]| {
+        let fixed = arguments!["convert", input, "s3://bucket/out.gs4d"];
+        fixed.into_iter().chain(more.iter().map(OsString::from)).collect::<Vec<_>>()
+    };
+    let by_url = convert("s3://bucket/in.gs4d".as_ref(), &[]);
+    let by_path = convert(large.as_os_str(), &["--level", "1"]);
+    // The properties of the input, its bytes, the output; an output in parts: its beginning, and its third part.
+    let lost = [(&by_url, 0, "in.gs4d"), (&by_url, 1, "in.gs4d"), (&by_url, 2, "out.gs4d")];
+    for (convert, requests, name) in lost.into_iter().chain([(&by_path, 0, "out.gs4d"), (&by_path, 3, "out.gs4d")]) {
+        server.lose_after(requests);
+        let run = run(&server, &cache, convert);
+        server.clear();
+        check_sentence(&run, &format!("s3://bucket/{name}"));
+        assert_eq!(server.get("out.gs4d").as_deref(), Some(b"before".as_slice()), "lost after {requests} requests");
+    }
+    check_kept(&cache, &read(&large));
+    for (convert, expected) in [(by_url, small), (by_path, large)] {
+        run(&server, &cache, &convert).text();
+        assert!(server.get("out.gs4d") == Some(read(&expected)), "the same command succeeds once the server is there");
+    }
+}
+
+#[test]
+fn a_server_that_does_not_answer_is_named_and_nothing_is_lost() {
+    let Some(server) = Server::start() else { return };
+    let (folder, cache) = (folder(), folder());
+    let input = scene(&folder, "60");
+    server.put("in.gs4d", &read(&input));
+    server.put("out.gs4d", b"before");
+    let convert = arguments!["convert", "s3://bucket/in.gs4d", "s3://bucket/out.gs4d"];
+    for (method, name) in [("HEAD", "in.gs4d"), ("PUT", "out.gs4d")] {
+        server.inject(method, name, Fault::Hangs, 1000);
+        let mut command = command(&server, &cache, &convert);
+        let run = Run::of(&command.env("AWS_TIMEOUT", "1s").output().expect("the command starts"));
+        server.clear();
+        check_sentence(&run, &format!("s3://bucket/{name}"));
+        assert_eq!(server.get("out.gs4d").as_deref(), Some(b"before".as_slice()), "the object is unchanged");
+    }
+    check_kept(&cache, &read(&input));
 }
 
 #[test]

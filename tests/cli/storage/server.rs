@@ -24,6 +24,8 @@ pub enum Fault {
     CutAfter(usize),
     /// The connection ends before the request is passed on.
     Dropped,
+    /// It is not answered.
+    Hangs,
 }
 
 /// Faults of the next requests of a method to names that end so.
@@ -47,6 +49,22 @@ pub struct Seen {
 struct State {
     plans: Mutex<Vec<Plan>>,
     seen: Mutex<Vec<Seen>>,
+    /// Requests that are answered before the server is lost, if it will be.
+    left: Mutex<Option<usize>>,
+}
+
+impl State {
+    /// Counts a request. Returns whether the server is lost.
+    fn is_lost(&self) -> bool {
+        match &mut *self.left.lock().expect("no thread panics") {
+            None => false,
+            Some(0) => true,
+            Some(left) => {
+                *left -= 1;
+                false
+            }
+        }
+    }
 }
 
 /// The server and the proxy. They end when it is dropped.
@@ -100,9 +118,15 @@ impl Server {
         self.state.plans.lock().expect("no thread panics").push(plan);
     }
 
-    /// From now on, no request has a fault.
+    /// After so many further requests the server is lost: every connection ends without an answer.
+    pub fn lose_after(&self, requests: usize) {
+        *self.state.left.lock().expect("no thread panics") = Some(requests);
+    }
+
+    /// From now on, the server is there and no request has a fault.
     pub fn clear(&self) {
         self.state.plans.lock().expect("no thread panics").clear();
+        *self.state.left.lock().expect("no thread panics") = None;
     }
 
     /// Returns the requests since the last call.
@@ -160,7 +184,7 @@ fn serve(mut client: TcpStream, upstream: &str, state: &State) {
         }
     }
     let mut body = vec![0; length];
-    if reader.read_exact(&mut body).is_err() {
+    if reader.read_exact(&mut body).is_err() || state.is_lost() {
         return;
     }
     let mut words = head.split_whitespace().map(str::to_owned);
@@ -180,6 +204,10 @@ fn serve(mut client: TcpStream, upstream: &str, state: &State) {
             let _ = client.write_all(b"HTTP/1.1 500 Error\r\nContent-Length: 0\r\nConnection: close\r\n\r\n");
         }
         Some(Fault::Dropped) => {}
+        Some(Fault::Hangs) => {
+            // Until the client gives up.
+            let _ = reader.read_to_end(&mut Vec::new());
+        }
         Some(Fault::CutAfter(_)) | None => {
             let mut server = TcpStream::connect(upstream).expect("the server listens");
             let request = [head.as_bytes(), b"Connection: close\r\n\r\n", &body].concat();

@@ -24,6 +24,9 @@ use present::Present;
 /// Bytes that a step uploads.
 const UPLOAD: u64 = 1 << 18;
 
+/// Bytes that are uploaded before the device has to have taken them: a browser blocks the page where it has no more memory for them.
+const UPLOADED_AT_ONCE: u64 = 1 << 22;
+
 /// A player on a canvas.
 #[wasm_bindgen]
 pub struct Player {
@@ -36,15 +39,17 @@ pub struct Player {
     present: Present,
     opening: Option<Loader>,
     shown: Option<Shown>,
-    /// Whether the device has finished the last picture.
+    /// Whether the device has finished the last picture, and whether it has taken what was uploaded.
     finished: Arc<AtomicBool>,
+    taken: Arc<AtomicBool>,
 }
 
 /// A file that is being opened.
 enum Loader {
     Reading(Opening),
     Read(Box<RuntimeScene>),
-    Uploading(Box<CaptureUpload<RuntimeScene>>, Kept),
+    /// With the bytes that were uploaded since the device had taken all.
+    Uploading(Box<CaptureUpload<RuntimeScene>>, Kept, u64),
     Uploaded(Box<Shown>),
 }
 
@@ -108,8 +113,9 @@ impl Player {
         surface.configure(device, &configuration);
         let view = ViewRenderer::new(device, &renderer);
         let present = Present::new(device, format);
-        let (opening, shown, finished) = (None, None, Arc::new(AtomicBool::new(true)));
-        Ok(Self { context, faults, surface, configuration, renderer, view, present, opening, shown, finished })
+        let (opening, shown) = (None, None);
+        let [finished, taken] = [true; 2].map(|done| Arc::new(AtomicBool::new(done)));
+        Ok(Self { context, faults, surface, configuration, renderer, view, present, opening, shown, finished, taken })
     }
 
     /// Sets the size of the pictures to that of the canvas, pixels.
@@ -130,11 +136,11 @@ impl Player {
         Ok(())
     }
 
-    /// Begins to open a file. The capture that is shown stays until the file is open.
-    pub fn open(&mut self, name: &str) {
+    /// Begins to open a file, whose length is 0 if it is not known. The capture that is shown stays until the file is open.
+    pub fn open(&mut self, name: &str, length: usize) {
         // The memory of a file that was being opened is free before that of the next is needed.
         self.opening = None;
-        self.opening = Some(Loader::Reading(Opening::new(name)));
+        self.opening = Some(Loader::Reading(Opening::new(name, length)));
     }
 
     /// Receives bytes of the file. [`step`](Self::step) begins once all have been received.
@@ -171,12 +177,24 @@ impl Player {
                 };
                 let upload = CaptureUpload::new(device, &self.renderer, *scene).map_err(|e| e.to_string())?;
                 ViewRenderer::check_room(device, upload.most_drawn()).map_err(|e| e.to_string())?;
-                self.opening = Some(Loader::Uploading(Box::new(upload), kept));
+                self.opening = Some(Loader::Uploading(Box::new(upload), kept, 0));
                 Ok(None)
             }
-            Some(Loader::Uploading(mut upload, kept)) => {
-                if upload.advance(queue, &self.renderer, UPLOAD) > 0 {
-                    self.opening = Some(Loader::Uploading(upload, kept));
+            Some(uploading @ Loader::Uploading(..)) if self.waits() => {
+                self.opening = Some(uploading);
+                Ok(None)
+            }
+            Some(Loader::Uploading(mut upload, kept, before)) => {
+                let uploaded = upload.advance(queue, &self.renderer, UPLOAD);
+                if uploaded > 0 {
+                    let mut all = before + uploaded;
+                    if all >= UPLOADED_AT_ONCE {
+                        all = 0;
+                        self.taken.store(false, Ordering::Relaxed);
+                        let taken = self.taken.clone();
+                        queue.on_submitted_work_done(move || taken.store(true, Ordering::Relaxed));
+                    }
+                    self.opening = Some(Loader::Uploading(upload, kept, all));
                     return Ok(None);
                 }
                 let capture = upload.finish(queue, &self.renderer);
@@ -196,6 +214,11 @@ impl Player {
                 Ok(Some(about))
             }
         }
+    }
+
+    /// Returns whether a step does nothing yet: the device has to take what was uploaded.
+    pub fn waits(&self) -> bool {
+        !self.taken.load(Ordering::Relaxed)
     }
 
     /// Returns the part of the opening that is done, 0 to 1.

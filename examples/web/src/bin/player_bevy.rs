@@ -33,9 +33,10 @@ struct Shared(Arc<Mutex<State>>);
 
 #[derive(Default)]
 struct State {
-    /// From the page: a scene to show, and the camera and the time to draw.
+    /// From the page: a scene to show, the camera and the time to draw, and the bias of the level of detail.
     scene: Option<Box<RuntimeScene>>,
     shot: Option<Shot>,
+    detail: f32,
     /// From the app: whether the scene is shown, why not, the frames until the last picture is on the canvas, and whether only the device has
     /// to finish it.
     shown: bool,
@@ -88,9 +89,16 @@ impl Player {
         Ok(Self { opening: None, about: None, shared })
     }
 
-    /// Begins to open a file. The capture that is shown stays until the file is open.
-    pub fn open(&mut self, name: &str) {
-        (self.opening, self.about) = (Some(Opening::new(name)), None);
+    /// Sets the bias of the level of detail: captures count as two to this power as large.
+    pub fn set_detail(&mut self, bias: f32) {
+        self.shared.state().detail = bias;
+    }
+
+    /// Begins to open a file, whose length is 0 if it is not known. The capture that is shown stays until the file is open.
+    pub fn open(&mut self, name: &str, length: usize) {
+        // The memory of a file that was being opened is free before that of the next is needed.
+        self.opening = None;
+        (self.opening, self.about) = (Some(Opening::new(name, length)), None);
     }
 
     /// Receives bytes of the file. [`step`](Self::step) begins once all have been received.
@@ -123,6 +131,12 @@ impl Player {
             None if state.shown => self.about.take().map(Some).ok_or_else(|| "no file is being opened".to_owned()),
             None => Ok(None),
         }
+    }
+
+    /// Returns whether a step does nothing yet: the app has to show the capture.
+    pub fn waits(&self) -> bool {
+        let state = self.shared.state();
+        self.opening.is_none() && !state.shown && state.failed.is_none()
     }
 
     /// Returns the part of the opening that is done, 0 to 1.
@@ -169,11 +183,13 @@ fn obey(
     shared: Res<Shared>,
     queue: Option<Res<RenderQueue>>,
     mut clear: ResMut<ClearColor>,
+    mut detail: ResMut<CaptureDetail>,
     mut captures: ResMut<Assets<GaussianCapture>>,
     mut shown: Query<(Entity, &GaussianCapture3d, &CaptureState, &mut Playback)>,
     mut camera: Single<(&mut Transform, &mut Projection), With<Camera3d>>,
 ) {
     let mut state = shared.state();
+    detail.bias = state.detail;
     if let Some(scene) = state.scene.take() {
         for (entity, ..) in &shown {
             commands.entity(entity).despawn();
