@@ -7,7 +7,7 @@ use super::parameters::{Instance, ViewParameters};
 use super::resources::Resources;
 use super::sizes::{Sizes, grown, max_pairs};
 use super::view_renderer::ViewRenderer;
-use crate::renderer::active::{drawn_count, most_drawn};
+use crate::renderer::active::{drawn_count, most_at_once, most_drawn};
 use crate::renderer::design::Design;
 use crate::renderer::error::GpuError;
 use crate::renderer::global_sort;
@@ -66,8 +66,10 @@ impl ViewRenderer {
         self.choose_design(device, renderer, slots);
         let (precision, blending) = (parameters.precision, parameters.blending());
         let picture = instances.first().map_or(self.picture, |instance| instance.view.size);
-        let total: usize = instances.iter().map(|instance| instance.capture.len()).sum();
-        let total = u32::try_from(total).unwrap_or(u32::MAX);
+        let sum = |count: fn(&Instance<'_>) -> usize| {
+            u32::try_from(instances.iter().map(count).sum::<usize>()).unwrap_or(u32::MAX)
+        };
+        let gaussians = sum(|instance| most_at_once(instance.capture, instance.active));
         self.pixels = Pixels { multisampled: blending.is_multisampled(), precision };
         self.has_depths = parameters.depths;
         let joined = instances.chunk_by(Instance::joins);
@@ -81,7 +83,7 @@ impl ViewRenderer {
         } else {
             let large_batches = tile_bins::large_batches(&device.limits(), instances);
             let lists = Lists::suiting(&device.limits(), self.bins.fullest);
-            let few_bins = tile_bins::few_bins(picture, tile_bins::bin_side(picture, total), total);
+            let few_bins = tile_bins::few_bins(picture, tile_bins::bin_side(picture, gaussians), gaussians);
             let wanted = BinVariant { few_bins, lists, blending, precision, large_batches };
             self.bins.variant = renderer.bin_variant(device, drawn, wanted)?;
             blending.writes_depths()
@@ -97,10 +99,10 @@ impl ViewRenderer {
         check_slots(&limits, self.design, slots)?;
         let slots = slots as u32;
         // A first guess; the counters of later frames correct it.
-        let guess = total.saturating_mul(2).min(slots.saturating_mul(6)).max(1 << 16);
+        let guess = gaussians.saturating_mul(2).min(slots.saturating_mul(6)).max(1 << 16);
         let most = max_pairs(device);
         let pairs = self.pairs_wanted.max(guess).min(most);
-        (self.picture, self.bins.side) = (picture, tile_bins::bin_side(picture, total));
+        (self.picture, self.bins.side) = (picture, tile_bins::bin_side(picture, gaussians));
         let in_bins = self.bins.fullest.saturating_mul(self.bins.count(picture));
         self.short_of_room = self.statistics.pairs > most || in_bins > most / 2;
         let entries = |picture| match self.design {
@@ -151,7 +153,7 @@ impl ViewRenderer {
         self.prepare_motion(device, queue, renderer, instances, parameters)?;
         self.statistics.bytes = self.resources.as_ref().map_or(0, |made| made.bytes)
             + self.motion.as_ref().map_or(0, MotionResources::bytes);
-        self.statistics.total = total;
+        self.statistics.total = sum(|instance| instance.capture.len());
         self.statistics.active = self.slots;
         self.write_uniforms(queue, instances, parameters, environment.map(|(i, m)| (i.view, i.appearance, m.size)));
         Ok(())
