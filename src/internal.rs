@@ -88,7 +88,20 @@ pub mod codec {
     /// # Errors
     /// As [`load`](crate::codec::load).
     pub fn read_bytes(path: &Path, bytes: &[u8]) -> Result<(GaussianScene, Vec<String>), CodecErrorKind> {
-        let imported = crate::codec::read_bytes(path, bytes, &InMemory::default(), &ReadOptions::default())?;
+        read_beside(path, bytes, Vec::new())
+    }
+
+    /// As [`read_bytes`], with the other files of its folder.
+    ///
+    /// # Errors
+    /// As [`load`](crate::codec::load).
+    pub fn read_beside(
+        path: &Path,
+        bytes: &[u8],
+        others: Vec<(String, Vec<u8>)>,
+    ) -> Result<(GaussianScene, Vec<String>), CodecErrorKind> {
+        let beside = InMemory(others.into_iter().collect());
+        let imported = crate::codec::read_bytes(path, bytes, &beside, &ReadOptions::default())?;
         Ok((imported.scene, imported.lost))
     }
 

@@ -24,12 +24,12 @@ pub struct ActiveList {
 impl ActiveList {
     /// Creates an empty list; returns `None` if the capture has no filter.
     pub fn new(device: &wgpu::Device, renderer: &Renderer, capture: &GpuCapture) -> Option<Self> {
-        capture.filter.as_ref()?;
+        let most = capture.filter.as_ref()?.most;
         let allocator = renderer.allocator(device);
         let count = (capture.len().max(1) as u64).next_multiple_of(u64::from(BLOCK));
         let parts = capture.parts.len().max(1) as u64;
         let uniforms = allocator.buffer("gs4d activations", parts * u64::from(INSTANCE_STRIDE), BufferUsages::UNIFORM);
-        let list = allocator.buffer("gs4d active list", count * 4, BufferUsages::STORAGE);
+        let list = allocator.buffer("gs4d active list", u64::from(most.max(1)) * 4, BufferUsages::STORAGE);
         let blocks = allocator.buffer("gs4d active blocks", count / u64::from(BLOCK) * 4, BufferUsages::STORAGE);
         let uniform = wgpu::BindingResource::Buffer(wgpu::BufferBinding {
             buffer: &uniforms,
@@ -60,7 +60,7 @@ impl ActiveList {
                 let activation = Activation { count: part.count, first, filter_mode: filter.mode, segment };
                 let at = index as u64 * u64::from(INSTANCE_STRIDE);
                 queue.write_buffer(&self.uniforms, at, bytemuck::bytes_of(&activation));
-                first += part.count;
+                first += filter.count(index, segment);
             }
         }
         !self.recorded
@@ -108,5 +108,15 @@ pub(super) fn most_drawn(capture: &GpuCapture, active: Option<&ActiveList>) -> u
     match (&capture.filter, active) {
         (Some(filter), Some(_)) => filter.most as usize,
         _ => capture.len(),
+    }
+}
+
+/// Returns the number of Gaussians by which the sizes of bins are chosen: the largest number at any time of a capture with other Gaussians at other
+/// times, as the frames of a sequence, otherwise all.
+pub(super) fn most_at_once(capture: &GpuCapture, active: Option<&ActiveList>) -> usize {
+    if capture.filter.as_ref().is_some_and(|filter| filter.is_window) {
+        most_drawn(capture, active)
+    } else {
+        capture.len()
     }
 }

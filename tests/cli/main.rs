@@ -16,6 +16,7 @@ mod export;
 mod faults;
 mod fine_tune;
 mod fleet;
+mod imports;
 #[cfg(target_os = "linux")]
 mod kills;
 mod options;

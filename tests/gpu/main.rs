@@ -12,6 +12,7 @@ mod detail;
 mod filter;
 mod fine_tune;
 mod fine_tune_run;
+mod flipbook;
 mod golden;
 mod hidden;
 mod layout;

@@ -14,7 +14,7 @@ use crate::renderer::pipelines::Renderer;
 use crate::renderer::shaders::Storage;
 use crate::scene::filter::segment_of;
 use crate::scene::packed::MAX_STAGES;
-use crate::scene::{ActiveSets, CodedColors, ColorDegrees, RuntimeScene, TemporalFilter};
+use crate::scene::{ActiveSets, CodedColors, ColorDegrees, FilterKind, RuntimeScene, TemporalFilter};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// A capture on the GPU: its Gaussians, color and environment map in buffers, in as many parts as the binding limit
@@ -52,6 +52,8 @@ pub(in crate::renderer) struct Part {
 pub(in crate::renderer) struct Filter {
     /// `FILTER_*`.
     pub mode: u32,
+    /// Whether the capture has other Gaussians at other times, as the frames of a sequence.
+    pub is_window: bool,
     segments: u32,
     interval: [f32; 2],
     /// Number of active Gaussians, part by part and segment by segment.
@@ -78,7 +80,8 @@ impl Filter {
         let segments = filter.segments as usize;
         let of_all_parts = |segment: usize| counts.iter().skip(segment).step_by(segments.max(1)).sum::<u32>();
         let most = (0..segments).map(of_all_parts).max().unwrap_or_default();
-        Self { mode, segments: filter.segments, interval, counts, bytes, most }
+        let is_window = filter.kind == FilterKind::Window;
+        Self { mode, is_window, segments: filter.segments, interval, counts, bytes, most }
     }
 
     /// Returns the segment of a time, in the capture's unit.

@@ -7,7 +7,7 @@ use super::parameters::{Instance, ViewParameters};
 use super::resources::Resources;
 use super::sizes::{Sizes, grown, max_pairs};
 use super::view_renderer::ViewRenderer;
-use crate::renderer::active::{drawn_count, most_drawn};
+use crate::renderer::active::{drawn_count, most_at_once, most_drawn};
 use crate::renderer::design::Design;
 use crate::renderer::error::GpuError;
 use crate::renderer::global_sort;
@@ -66,17 +66,19 @@ impl ViewRenderer {
         self.choose_design(device, renderer, at_most);
         let (precision, blending) = (parameters.precision, parameters.blending());
         let picture = instances.first().map_or(self.picture, |instance| instance.view.size);
-        let total: usize = instances.iter().map(|instance| instance.capture.len()).sum();
-        let total = u32::try_from(total).unwrap_or(u32::MAX);
+        let sum = |count: fn(&Instance<'_>) -> usize| {
+            u32::try_from(instances.iter().map(count).sum::<usize>()).unwrap_or(u32::MAX)
+        };
+        let gaussians = sum(|instance| most_at_once(instance.capture, instance.active));
         let limits = device.limits();
         require_texture(picture, &limits)?;
         check_slots(&limits, self.design, at_most)?;
         let slots = at_most as u32;
         // A first guess; the counters of later frames correct it.
-        let guess = total.saturating_mul(2).min(slots.saturating_mul(6)).max(1 << 16);
+        let guess = gaussians.saturating_mul(2).min(slots.saturating_mul(6)).max(1 << 16);
         let most = max_pairs(device);
         let pairs = self.pairs_wanted.max(guess).min(most);
-        let side = tile_bins::bin_side(picture, total);
+        let side = tile_bins::bin_side(picture, gaussians);
         // An entry has twice as many bytes as a pair.
         let equal_rooms = tile_bins::equal_rooms(pairs).min(most / 2);
         let first_entries = |picture| tile_bins::first_guess(picture, side, slots);
@@ -93,7 +95,7 @@ impl ViewRenderer {
         } else {
             let large_batches = tile_bins::large_batches(&limits, instances);
             let lists = Lists::suiting(&limits, self.bins.fullest);
-            let few_bins = tile_bins::few_bins(picture, side, total);
+            let few_bins = tile_bins::few_bins(picture, side, gaussians);
             let counted = self.bins.must_count(first_entries(picture), equal_rooms);
             let wanted = BinVariant { few_bins, counted, lists, blending, precision, large_batches };
             self.bins.variant = renderer.bin_variant(device, drawn, wanted)?;
@@ -156,7 +158,7 @@ impl ViewRenderer {
         self.prepare_motion(device, queue, renderer, instances, parameters)?;
         self.statistics.bytes = self.resources.as_ref().map_or(0, |made| made.bytes)
             + self.motion.as_ref().map_or(0, MotionResources::bytes);
-        self.statistics.total = total;
+        self.statistics.total = sum(|instance| instance.capture.len());
         self.statistics.active = self.slots;
         self.write_uniforms(queue, instances, parameters, environment.map(|(i, m)| (i.view, i.appearance, m.size)));
         Ok(())

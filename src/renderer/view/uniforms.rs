@@ -28,8 +28,8 @@ impl ViewRenderer {
             let view = layout::InstanceUniforms::new(&instance.view, &instance.appearance, blend_space, debug);
             let capture = instance.capture.instance(&view);
             let mut first_listed = 0;
-            for (part_index, part) in instance.capture.parts.iter().enumerate() {
-                let count = drawn_count(instance.capture, part_index, instance.active);
+            for part in 0..instance.capture.parts.len() {
+                let count = drawn_count(instance.capture, part, instance.active);
                 let listed = u32::from(instance.active.is_some());
                 let binning = self.bins.uniform(&made.sizes, self.picture, index);
                 let per_thread = per_thread(count);
@@ -45,7 +45,7 @@ impl ViewRenderer {
                 uniforms.extend_from_slice(bytemuck::bytes_of(&uniform));
                 uniforms.resize(uniforms.len().next_multiple_of(INSTANCE_STRIDE as usize), 0);
                 slot += count;
-                first_listed += part.count;
+                first_listed += count;
                 index += 1;
             }
         }

@@ -16,6 +16,17 @@ pub fn change(bytes: &mut Vec<u8>, other: &[u8], random: &mut Random) {
     bytes.truncate(MOST);
 }
 
+/// Overwrites one to four numbers of four bytes each, at multiples of four bytes.
+pub fn change_numbers(bytes: &mut [u8], random: &mut Random) {
+    for _ in 0..=random.below(4) {
+        let at = random.below(bytes.len() / 4) * 4;
+        let number = if random.one_in(3) { numbers::whole(random) as u32 } else { numbers::float(random).to_bits() };
+        for (byte, new) in bytes.iter_mut().skip(at).zip(number.to_le_bytes()) {
+            *byte = new;
+        }
+    }
+}
+
 fn change_once(bytes: &mut Vec<u8>, other: &[u8], random: &mut Random) {
     let at = random.below(bytes.len());
     let (part, foreign) = (random.part(bytes.len()), random.part(other.len()));
