@@ -46,15 +46,15 @@ impl Seen {
     }
 }
 
-/// Returns what a browser has seen: it runs once for all tests. `None` if this machine has none, or no page is built.
+/// Returns what a browser has seen: it runs once for all tests, which all fail if it does. `None` if this machine has none, or no page is built.
 fn seen() -> Option<&'static Seen> {
-    static SEEN: OnceLock<Option<Seen>> = OnceLock::new();
+    static SEEN: OnceLock<Option<Result<Seen, String>>> = OnceLock::new();
     let seen = SEEN.get_or_init(|| {
         let folder = PathBuf::from(std::env::var_os("GS4D_WEB")?);
         let program = browser::program()?;
         let shots = shots::all();
         let results = server::serve(&folder, &shots, large(), |address| browser::open(&program, address));
-        Some(Seen { results, shots })
+        Some(results.map(|results| Seen { results, shots }))
     });
     if seen.is_none() {
         skip(match std::env::var_os("GS4D_WEB") {
@@ -62,7 +62,8 @@ fn seen() -> Option<&'static Seen> {
             Some(_) => "there is no Chromium: `apt-get install chromium`",
         });
     }
-    seen.as_ref()
+    let seen = seen.as_ref()?;
+    Some(seen.as_ref().unwrap_or_else(|message| panic!("the page failed: {message}")))
 }
 
 /// Returns a package of many Gaussians.

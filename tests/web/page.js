@@ -13,7 +13,7 @@ const frames = new Map();
 addEventListener('message', (event) => frames.get(event.source)?.push(event.data));
 
 // Opens a player, and waits for its first picture or its refusal.
-async function open(query, width = 320, height = 180) {
+async function open(query, width = 320, height = 180, seconds = 60) {
   const frame = document.createElement('iframe');
   Object.assign(frame.style, { width: `${width}px`, height: `${height}px`, border: 0 });
   frame.allow = 'fullscreen';
@@ -21,7 +21,7 @@ async function open(query, width = 320, height = 180) {
   const events = [];
   frames.set(frame.contentWindow, events);
   frame.src = `/page/index.html?${query}`;
-  await until(`a picture or a message of ?${query}`, () => events.some((event) => event.gs4d === 'picture' || event.gs4d === 'error'));
+  await until(`a picture or a message of ?${query}`, () => events.some((event) => event.gs4d === 'picture' || event.gs4d === 'error'), seconds);
   const inside = frame.contentWindow;
   const at = (id) => inside.document.getElementById(id);
   return {
@@ -293,8 +293,8 @@ async function phone(player) {
 // The same page with the Bevy app, if it is built.
 async function bevy(shots) {
   if (!(await fetch('/page/player_bevy.js')).ok) return;
-  // In so small a picture an app draws a level of detail: here all Gaussians.
-  const player = await open('engine=bevy&autoplay=0&detail=8');
+  // In so small a picture an app draws a level of detail: here all Gaussians. Its many passes take minutes to compile on a busy machine.
+  const player = await open('engine=bevy&autoplay=0&detail=8', 320, 180, 200);
   for (const [index, shot] of shots.entries()) {
     if (shot.file !== '/page/toybox.gs4d') continue;
     Object.assign(player.frame.style, { width: `${shot.width}px`, height: `${shot.height}px` });

@@ -1,7 +1,7 @@
 //! The server of the pages.
 //!
 //! In: the folder of the built page, the pictures that are wanted, a large capture, a function that opens an address in a browser. Out: what the page has
-//! posted, by name, once it has posted `end`.
+//! posted, by name, once it has posted `end`; a message if it fails.
 
 use crate::browser::Browser;
 use crate::shots::{Shot, listed};
@@ -24,7 +24,12 @@ const LIMIT: Duration = Duration::from_secs(240);
 const LONGEST: usize = 1 << 24;
 
 /// Serves the pages until they are done.
-pub fn serve(folder: &Path, shots: &[Shot], large: Vec<u8>, open: impl FnOnce(&str) -> Browser) -> Results {
+pub fn serve(
+    folder: &Path,
+    shots: &[Shot],
+    large: Vec<u8>,
+    open: impl FnOnce(&str) -> Browser,
+) -> Result<Results, String> {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
     let address = format!("http://{}/test/page.html", listener.local_addr().expect("an address"));
     let (to, posted) = channel();
@@ -53,14 +58,16 @@ pub fn serve(folder: &Path, shots: &[Shot], large: Vec<u8>, open: impl FnOnce(&s
         match posted.recv_timeout(LIMIT) {
             Ok((name, _)) if name == "end" => break,
             Ok((name, bytes)) => drop(results.insert(name, bytes)),
-            Err(_) => panic!("the page ends within {LIMIT:?} of its last report; it has reported {:?}", results.keys()),
+            Err(_) => {
+                return Err(format!("the page reports nothing for {LIMIT:?}; it has reported {:?}", results.keys()));
+            }
         }
     }
     drop(browser);
-    if let Some(failure) = results.get("failure") {
-        panic!("the page failed: {}; it has reported {:?}", String::from_utf8_lossy(failure), results.keys());
+    match results.get("failure") {
+        Some(failure) => Err(format!("{}; it has reported {:?}", String::from_utf8_lossy(failure), results.keys())),
+        None => Ok(results),
     }
-    results
 }
 
 /// Answers one request. A browser that ends a connection early is no fault.
