@@ -339,6 +339,24 @@ fn a_capture_larger_than_a_binding_is_drawn_in_parts() {
 }
 
 #[test]
+fn the_active_gaussians_of_a_capture_in_parts_are_those_of_the_whole() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let Some(mut limited) = limited_device::headless() else { return };
+    let scene = packed_scene::scene(5_000, 3, 2);
+    assert!(
+        size_of_val(&scene.form.harmonics().expect("whole").values[..]) as u64 > limited_device::BINDING,
+        "the color coefficients exceed one binding"
+    );
+    let [whole, parts] = [&headless, &limited].map(|headless| headless.upload(&scene).expect("upload"));
+    for time in [0.05, 0.5, 0.95, 0.3] {
+        let view = look_from(EYE, SIZE, time);
+        let whole = headless.render(&whole, &view, BACKGROUND).expect("render");
+        let parts = limited.render(&parts, &view, BACKGROUND).expect("render");
+        assert!(whole.counts.visible > 0 && whole == parts, "at {time}: a capture in parts equals the whole capture");
+    }
+}
+
+#[test]
 fn frames_beyond_the_limits_of_a_device_are_refused_without_side_effects() {
     let Some(mut limited) = limited_device::headless() else { return };
     let scene = scene(1_000);

@@ -72,7 +72,7 @@ impl Imports {
         let mut seeds: Vec<Seed> = files.into_iter().map(Seed::of).collect();
         match name {
             "spz" => seeds.extend(seeds.iter().flat_map(Seed::other_versions).collect::<Vec<_>>()),
-            "gltf" => seeds = seeds.into_iter().map(Seed::as_text).collect(),
+            "gltf" => seeds = seeds.into_iter().map(Seed::into_text).collect(),
             _ => {}
         }
         let all = Self { path: Path::new("a").with_extension(extension), read, seeds };

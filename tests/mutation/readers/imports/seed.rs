@@ -111,7 +111,7 @@ impl Seed {
     }
 
     /// Returns the same glTF file as text.
-    pub fn as_text(self) -> Self {
+    pub fn into_text(self) -> Self {
         let Self::Gltf { json, binary, .. } = self else { panic!("a glTF file") };
         let json = json.replacen(r#""buffers":[{"#, &format!(r#""buffers":[{{"uri":"{BINARY}","#), 1);
         Self::Gltf { json, binary, is_text: true }
