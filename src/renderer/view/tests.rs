@@ -102,6 +102,12 @@ impl Gpu {
     }
 }
 
+/// Returns the largest difference of a value of two pictures.
+fn largest_difference(found: &[[f32; 4]], expected: &[[f32; 4]]) -> f32 {
+    let apart = found.iter().zip(expected).flat_map(|(a, b)| a.iter().zip(b).map(|(a, b)| (a - b).abs()));
+    apart.fold(0.0, f32::max)
+}
+
 fn seen(time: f32) -> View {
     let camera = Camera::look_at(Vec3::new(0.0, -3.0, 0.0), Vec3::ZERO, Vec3::Z, 0.8, SIZE);
     camera.view(time, RasterFov::Reference)
@@ -145,13 +151,17 @@ fn the_number_of_pairs_saturates() {
     let (capture, mut view) = (gpu.upload(crowd(500)), gpu.view());
     // The buffers have grown by then.
     let expected = [(); 6].map(|()| gpu.draw(&mut view, &capture, 0.0))[5];
+    let picture = gpu.picture(&view);
     let next = 1 - view.bins.parity();
     let made = view.resources.as_ref().expect("a prepared view");
     let DesignBuffers::TileBins(buffers) = &made.buffers else { panic!("the view has tile bins") };
     let counters = buffers.bins[next].clone();
     gpu.context.queue.write_buffer(&counters, 0, &(u32::MAX - 10).to_ne_bytes());
     let found = gpu.draw(&mut view, &capture, 0.0);
-    assert_eq!(found, Counters { pairs: u32::MAX, ..expected }, "a count above 2^32 does not wrap");
+    let saturated = Counters { pairs: u32::MAX, padding: 0, ..expected };
+    assert_eq!(found, saturated, "a count above 2^32 does not wrap, and no pairs are written");
+    let apart = largest_difference(&gpu.picture(&view), &picture);
+    assert!(apart <= 1e-6, "tiles without pairs search all splats; the frame differs by {apart}");
     for _ in 0..2 {
         assert_eq!(gpu.draw(&mut view, &capture, 0.0), expected, "later frames count their own pairs");
     }
@@ -175,9 +185,7 @@ fn splats_of_a_frame_with_the_same_stamp_are_not_drawn() {
     // As after 65,534 more frames. The bins are still too small for the splats, so that tiles search them.
     view.bins.frames = 0xfffe;
     gpu.draw(&mut view, &capture, 1.0);
-    let found = gpu.picture(&view);
-    let apart = found.iter().zip(&expected).flat_map(|(a, b)| a.iter().zip(b).map(|(a, b)| (a - b).abs()));
-    let apart = apart.fold(0.0, f32::max);
+    let apart = largest_difference(&gpu.picture(&view), &expected);
     assert!(apart <= 1e-6, "the frame with the stamp of the first frame differs by {apart}");
 }
 
