@@ -105,7 +105,7 @@ fn crowd_among_many(shown: usize, all: usize) -> RuntimeScene {
         // Every 13th Gaussian is shown, so that the workgroups and the lists of visible splats have gaps.
         if index % 13 > 0 || index / 13 >= shown {
             gaussian.mean[1] = -10.0;
-        } else if index / 13 % 500 == 0 {
+        } else if index / 13 % 1_500 == 0 {
             *gaussian = Gaussian { mean_t: 0.0, ..blob(Vec3::from(gaussian.mean), Vec3::splat(0.6), 0.012) };
         }
     }
@@ -139,7 +139,7 @@ fn bins_with_exact_room_match_the_reference_design() {
         for frame in 1..3 {
             let found = draw(Design::TileBins);
             let difference = difference(&found, &expected);
-            println!("{size}, {shown} splats, frame {frame}: {difference:.1e}");
+            println!("{size}, {shown} splats, frame {frame}: {difference:.1e}, {:?}", found.counts);
             assert!(difference <= 1e-5, "{size}, {shown} splats, frame {frame}: differs by {difference}");
             assert_eq!(found.counts, expected.counts, "{size}, {shown} splats, frame {frame}: the counts are the same");
         }
