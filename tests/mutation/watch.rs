@@ -19,6 +19,8 @@ use std::time::{Duration, Instant};
 const STACK: usize = 2 << 20;
 /// The longest time that an input may take, including the checks of an accepted result.
 const TIME: Duration = Duration::from_secs(2);
+/// The most often that an input is read which takes longer.
+const ATTEMPTS: usize = 3;
 /// Time after which an input is given up.
 const STUCK: Duration = Duration::from_secs(60);
 /// The most memory that an input may take, bytes.
@@ -67,8 +69,23 @@ fn take_panics() -> Option<String> {
     first.map(|first| if count > 1 { format!("{count} panics, the first: {first}") } else { first })
 }
 
-/// Runs a reader on an input. `name` is the name of the input.
+/// Runs a reader on an input. `name` is the name of the input. An input that takes too long is read again, because other programs may have taken
+/// the processor: the shortest time counts.
 pub fn watch(name: &str, reader: &Arc<dyn Reader>, bytes: &Arc<[u8]>) -> Seen {
+    let mut seen = watch_once(name, reader, bytes);
+    for _ in 1..ATTEMPTS {
+        if seen.stuck || seen.time <= TIME {
+            break;
+        }
+        let again = watch_once(name, reader, bytes);
+        if again.stuck || again.time < seen.time {
+            seen = again;
+        }
+    }
+    seen
+}
+
+fn watch_once(name: &str, reader: &Arc<dyn Reader>, bytes: &Arc<[u8]>) -> Seen {
     let (sender, receiver) = mpsc::channel();
     let (reader, bytes) = (Arc::clone(reader), Arc::clone(bytes));
     take_panics();
