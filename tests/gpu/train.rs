@@ -141,6 +141,22 @@ fn rows(state: &TrainerState, buffer: usize) -> Vec<Vec<f32>> {
     values.chunks_exact(values.len() / COUNT).map(<[f32]>::to_vec).collect()
 }
 
+/// The buffers of moments.
+const MOMENTS: [usize; 4] = [1, 2, 4, 5];
+
+/// Asserts that all Gaussians have the colors of their sources, new ones moments of zero, and the others their own moments.
+fn assert_copied(before: &TrainerState, after: &TrainerState, source: &[usize], is_new: &[bool]) {
+    let (colors, colors_before) = (rows(after, 3), rows(before, 3));
+    assert!((0..COUNT).all(|index| colors[index] == colors_before[source[index]]), "colors are those of the sources");
+    for buffer in MOMENTS {
+        let (moments, moments_before) = (rows(after, buffer), rows(before, buffer));
+        for index in 0..COUNT {
+            let expected = if is_new[index] { vec![0.0; moments[index].len()] } else { moments_before[index].clone() };
+            assert_eq!(moments[index], expected, "buffer {buffer}: the moments of Gaussian {index}");
+        }
+    }
+}
+
 #[test]
 fn relocation_copies_what_the_cpu_reference_says_and_hardly_changes_the_picture() {
     let Some(mut headless) = gpu::headless() else { return };
@@ -180,14 +196,9 @@ fn relocation_copies_what_the_cpu_reference_says_and_hardly_changes_the_picture(
         is_new[to as usize] = true;
         is_new[from as usize] = true;
     }
-    let (colors, colors_before) = (rows(&after, 3), rows(&before, 3));
-    assert!((0..COUNT).all(|index| colors[index] == colors_before[source[index]]), "colors are those of the sources");
-    for buffer in [1, 2, 4, 5] {
-        let (moments, moments_before) = (rows(&after, buffer), rows(&before, buffer));
-        for index in 0..COUNT {
-            let expected = if is_new[index] { vec![0.0; moments[index].len()] } else { moments_before[index].clone() };
-            assert_eq!(moments[index], expected, "buffer {buffer}: the moments of Gaussian {index}");
-        }
+    assert_copied(&before, &after, &source, &is_new);
+    for buffer in MOMENTS {
+        let moments = rows(&after, buffer);
         let kept = (0..COUNT).any(|index| !is_new[index] && moments[index].iter().any(|&moment| moment != 0.0));
         assert!(kept, "buffer {buffer}: a Gaussian that is not relocated has moments");
     }
@@ -286,15 +297,7 @@ fn the_densification_of_the_original_is_that_of_the_cpu_reference() {
         source[to as usize] = from as usize;
         is_new[to as usize] = true;
     }
-    let (colors, colors_before) = (rows(&after, 3), rows(&before, 3));
-    assert!((0..COUNT).all(|index| colors[index] == colors_before[source[index]]), "colors are those of the sources");
-    for buffer in [1, 2, 4, 5] {
-        let (moments, moments_before) = (rows(&after, buffer), rows(&before, buffer));
-        for index in 0..COUNT {
-            let expected = if is_new[index] { vec![0.0; moments[index].len()] } else { moments_before[index].clone() };
-            assert_eq!(moments[index], expected, "buffer {buffer}: the moments of Gaussian {index}");
-        }
-    }
+    assert_copied(&before, &after, &source, &is_new);
     assert_eq!(trainer.screen_gradients(2).expect("they can be read"), [0.0; COUNT], "sums begin again");
     trainer.reset_opacity().expect("the device works");
     reset_opacity(&mut expected);
