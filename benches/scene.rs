@@ -1,4 +1,4 @@
-//! Wall-clock time of a Bevy app's frame with a capture in a scene: the cost of glass, fog, shadows and many copies.
+//! Wall-clock time of a Bevy app's frame with a capture in a scene: the cost of walls, glass, fog, shadows, cameras and many copies.
 //!
 //! ```text
 //! cargo bench --features viewer,cli --bench scene -- [CAPTURE] [--size WIDTHxHEIGHT] [--frames N] [--rounds N] [--only WORD]
@@ -8,7 +8,7 @@
 //! (9), a word in the names of the scenes to measure (all scenes). Out: for each scene milliseconds of a frame (median of the rounds), the
 //! spread of the rounds, the additional time compared with the scene that the last column names (median of the rounds' differences), and the
 //! range of the middle half of these differences; then, from the same number of further frames but at most 100, the GPU time of the captures'
-//! passes and the number of splats. Default plugins, no window, pipelined rendering; all apps take turns, and each measurement ends when the
+//! passes, the number of splats, and the GPU memory of all views. Default plugins, no window, pipelined rendering; all apps take turns, and each measurement ends when the
 //! GPU has finished.
 
 mod common;
@@ -24,6 +24,8 @@ enum Kind {
     Nothing,
     Capture,
     TwoViews,
+    FourViews,
+    Wall,
     GlassAlone,
     Glass,
     Fog,
@@ -37,14 +39,17 @@ enum Kind {
 use Kind::*;
 
 /// The scenes: a name, the contents, the samples of the camera, and the name of the scene for comparison.
-const SCENES: [(&str, Kind, Msaa, &str); 15] = [
+const SCENES: [(&str, Kind, Msaa, &str); 18] = [
     ("nothing", Nothing, Msaa::Off, "nothing"),
     ("capture", Capture, Msaa::Off, "nothing"),
     ("capture, two cameras", TwoViews, Msaa::Off, "capture"),
+    ("capture, four cameras", FourViews, Msaa::Off, "capture"),
+    ("capture behind a wall", Wall, Msaa::Off, "capture"),
     ("glass alone", GlassAlone, Msaa::Off, "nothing"),
     ("glass before the capture", Glass, Msaa::Off, "glass alone"),
     ("nothing, 4 samples", Nothing, Msaa::Sample4, "nothing, 4 samples"),
     ("capture, 4 samples", Capture, Msaa::Sample4, "nothing, 4 samples"),
+    ("capture behind a wall, 4 samples", Wall, Msaa::Sample4, "capture, 4 samples"),
     ("glass alone, 4 samples", GlassAlone, Msaa::Sample4, "nothing, 4 samples"),
     ("glass before the capture, 4 samples", Glass, Msaa::Sample4, "glass alone, 4 samples"),
     ("capture in fog", Fog, Msaa::Off, "capture"),
@@ -76,8 +81,8 @@ fn main() -> Result {
     let measured = common::measure(&mut apps, &arguments)?;
     println!("{}, {}x{}", arguments.capture.display(), arguments.size.x, arguments.size.y);
     println!(
-        "{:<36} {:>9} {:>15} {:>9} {:>15} {:>9} {:>9}  than",
-        "scene", "frame ms", "rounds ms", "more ms", "middle half", "GPU ms", "splats"
+        "{:<36} {:>9} {:>15} {:>9} {:>15} {:>9} {:>9} {:>8}  than",
+        "scene", "frame ms", "rounds ms", "more ms", "middle half", "GPU ms", "splats", "views MB"
     );
     let mut known: Vec<(&str, &Times)> = Vec::new();
     let timed = scenes.into_iter().zip(&mut apps).zip(&measured);
@@ -85,31 +90,35 @@ fn main() -> Result {
         known.push((name, times));
         let than = known.iter().find(|(name, _)| *name == compared);
         let (more, middle) = than.map_or((f64::NAN, String::new()), |(_, than)| times.more_than(than));
-        let (gpu, splats) = passes(app, arguments.frames.clamp(1, 100))?;
+        let (gpu, splats, bytes) = passes(app, arguments.frames.clamp(1, 100))?;
         println!(
-            "{name:<36} {:>9.3} {:>15} {more:>9.3} {middle:>15} {gpu:>9.4} {splats:>9}  {compared}",
+            "{name:<36} {:>9.3} {:>15} {more:>9.3} {middle:>15} {gpu:>9.4} {splats:>9} {:>8.1}  {compared}",
             times.median(),
-            times.spread()
+            times.spread(),
+            bytes as f64 / 1e6
         );
     }
     Ok(())
 }
 
-/// Returns the GPU time of all passes for captures in a frame, in milliseconds (median of `frames` frames), and the number of splats.
-fn passes(app: &mut App, frames: u32) -> Result<(f64, u32)> {
+/// Returns the GPU time of all passes for captures in a frame, in milliseconds (median of `frames` frames), the number of splats, and the bytes
+/// of all views.
+fn passes(app: &mut App, frames: u32) -> Result<(f64, u32, u64)> {
     let statistics = app.world().resource::<CaptureStatistics>().clone();
     statistics.measure(true);
     common::warm_up(app)?;
-    let (mut times, mut splats) = (Vec::new(), 0);
+    let (mut times, mut splats, mut bytes) = (Vec::new(), 0, 0);
     for _ in 0..frames {
         common::run(app, 1)?;
         let views = statistics.views();
         times.push(views.iter().flat_map(|(_, view)| &view.passes).map(|pass| pass.milliseconds).sum::<f64>());
         splats = views.iter().map(|(_, view)| view.visible).sum();
+        let shared = views.iter().map(|(_, view)| view.shared_bytes).max().unwrap_or(0);
+        bytes = shared + views.iter().map(|(_, view)| view.bytes).sum::<u64>();
     }
     statistics.measure(false);
     times.sort_by(f64::total_cmp);
-    Ok((times[times.len() / 2], splats))
+    Ok((times[times.len() / 2], splats, bytes))
 }
 
 /// Returns an app with a camera and a scene. All assets are loaded.
@@ -131,6 +140,13 @@ fn app(arguments: &Arguments, logged: bool, kind: Kind, msaa: Msaa) -> Result<Ap
         let before = Transform::from_xyz(-2.0, 1.0, 1.3).looking_at(place.translation, Vec3::Y);
         world.spawn((Mesh3d(pane), MeshMaterial3d(material), before));
     }
+    if kind == Wall {
+        let material = StandardMaterial { unlit: true, ..default() };
+        let material = world.resource_mut::<Assets<StandardMaterial>>().add(material);
+        let wall = world.resource_mut::<Assets<Mesh>>().add(Cuboid::new(6.0, 6.0, 0.01));
+        let before = Transform::from_xyz(-2.0, 1.0, 1.3).looking_at(place.translation, Vec3::Y);
+        world.spawn((Mesh3d(wall), MeshMaterial3d(material), before));
+    }
     if matches!(kind, SunAlone | Sun | Shadow) {
         let floor = world.resource_mut::<Assets<Mesh>>().add(Plane3d::default().mesh().size(12.0, 12.0));
         let material = world.resource_mut::<Assets<StandardMaterial>>().add(StandardMaterial::default());
@@ -143,8 +159,13 @@ fn app(arguments: &Arguments, logged: bool, kind: Kind, msaa: Msaa) -> Result<Ap
         let falloff = FogFalloff::Exponential { density: 0.1 };
         world.entity_mut(camera).insert(DistanceFog { color: Color::srgb(0.5, 0.6, 0.7), falloff, ..default() });
     }
-    if kind == TwoViews {
-        world.spawn((Camera3d::default(), Camera { order: -1, ..default() }, msaa, place));
+    let more = match kind {
+        TwoViews => 1,
+        FourViews => 3,
+        _ => 0,
+    };
+    for camera in 0..more {
+        world.spawn((Camera3d::default(), Camera { order: -1 - camera, ..default() }, msaa, place));
     }
     let handle = world.resource::<AssetServer>().load(arguments.capture.clone());
     match kind {
@@ -160,7 +181,7 @@ fn app(arguments: &Arguments, logged: bool, kind: Kind, msaa: Msaa) -> Result<Ap
                 world.spawn((GaussianCapture3d(handle.clone()), Upright, at));
             }
         }
-        Capture | TwoViews | Glass | Fog | Sun | Shadow => {
+        Capture | TwoViews | FourViews | Wall | Glass | Fog | Sun | Shadow => {
             let capture = world.spawn((GaussianCapture3d(handle), Upright)).id();
             if kind == Shadow {
                 world.entity_mut(capture).insert(CastsShadows { resolution: ShadowResolution::Full, ..default() });

@@ -152,7 +152,9 @@ pub mod renderer {
     }
     /// Variants of the passes of tile bins.
     pub mod tile_bins {
-        pub use crate::renderer::tile_bins::{Blending, COUNTED, EIGHT_AT_ONCE, FEW_BINS, LARGE_BATCHES, Lists};
+        pub use crate::renderer::tile_bins::{
+            Blending, COUNTED, EIGHT_AT_ONCE, FEW_BINS, LARGE_BATCHES, Lists, OPAQUE,
+        };
     }
 }
 

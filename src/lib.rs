@@ -69,7 +69,8 @@
 //! 2. [`renderer`] draws views with plain wgpu, on whatever device it is given; it knows nothing of Bevy. `activate` lists the Gaussians
 //!    that the temporal filter leaves, only when a capture enters another segment of time. All captures in a view share one compute
 //!    pass, so that they interleave by depth. Its size is decided on the GPU: nothing is read back inside a frame.
-//! 3. Inside `blend` the depth of opaque meshes cuts the splats, pixel by pixel. The composite lays the result over what the
+//! 3. Inside `blend` and `blend_blocks` the depth of opaque meshes cuts the splats, pixel by pixel; before `project_bin`, `find_surfaces` finds the
+//!    farthest mesh of each tile, behind which splats are left out. The composite lays the result over what the
 //!    camera has drawn so far; it, `write_depth` and `write_motion` are the passes in Bevy's pipeline cache.
 //! 4. [`renderer::Headless`] returns the result as a [`Frame`](view::Frame) instead. The `gs4d` command and the tests use it.
 //!

@@ -1,5 +1,5 @@
 // project_bin: slices each Gaussian at the view's time, projects it, and puts its splat into the bins that it covers; the first pass of tile bins.
-// In: Gaussians, an instance, a list of active Gaussians. Out: splats without color, the list of the visible splats, and unordered bins of a
+// In: Gaussians, an instance, a list of active Gaussians, with OPAQUE the surfaces of `find_surfaces`. Out: splats without color, the list of the visible splats, and unordered bins of a
 // few tiles, or if they have no room yet, the number of splats of each bin. CPU reference: src/reference/project.rs with src/gaussian/projection.rs.
 #import gs4d::types::{SplatShape, VisibleSplat, BIN_COUNTERS, DEBUG_ACTIVE, INVISIBLE}
 #import gs4d::bins::{depth_order, stamp}
@@ -9,11 +9,22 @@
 #endif
 #import gs4d::filling::{begin_filling, bins, count_splat, filling_of, put_splat, put_wide_splats, reserve_entries, Filling, OWN_BINS}
 #import gs4d::projection::{debug_color, is_present, projection_of}
+#ifdef OPAQUE
+#import gs4d::tile::{pack_tiles, tile_index}
+#else
 #import gs4d::tile::pack_tiles
+#endif
 
 @group(0) @binding(1) var<storage, read_write> splats: array<SplatShape>;
 // The visible splats of each part, from its first slot on.
 @group(0) @binding(4) var<storage, read_write> visible: array<VisibleSplat>;
+#ifdef OPAQUE
+// Depth order of the farthest opaque surface of each tile.
+@group(0) @binding(5) var<storage, read> tile_surfaces: array<u32>;
+
+// Largest number of tiles of a splat that is left out: a thread tests all of them.
+const TESTED_TILES: u32 = 256u;
+#endif
 
 // Indices of the workgroup's Gaussians that are present, relative to its first, two per word. The host assigns at most four Gaussians to
 // each thread.
@@ -23,6 +34,20 @@ var<workgroup> own_visible: atomic<u32>;
 var<workgroup> own_pairs: atomic<u32>;
 // Index in the part's list of the first visible splat of the workgroup.
 var<workgroup> visible_before: u32;
+
+#ifdef OPAQUE
+// Returns whether a splat is behind the surfaces of all pixels of its tiles: `blend_blocks` would show it nowhere.
+fn is_hidden(tiles: vec4<u32>, key: u32) -> bool {
+    let size = tiles.zw - tiles.xy;
+    var hidden = size.x * size.y <= TESTED_TILES;
+    for (var y = tiles.y; hidden && y < tiles.w; y++) {
+        for (var x = tiles.x; hidden && x < tiles.z; x++) {
+            hidden = key > tile_surfaces[tile_index(vec2(x, y), instance.tiles.x)];
+        }
+    }
+    return hidden;
+}
+#endif
 
 // Returns the bins that are filled, each with room for the same number of splats. Without room, splats are only counted.
 fn filled() -> Filling {
@@ -84,7 +109,12 @@ fn project_and_bin(first_of_group: u32, place: u32, count: u32, thread: u32) {
         slot = instance.first_slot + i;
         index = index_of(i);
         let p = projection_of(index);
-        if p.depth_key != INVISIBLE {
+        key = depth_order(p.depth);
+        var is_visible = p.depth_key != INVISIBLE;
+#ifdef OPAQUE
+        is_visible = is_visible && !is_hidden(p.tiles, key);
+#endif
+        if is_visible {
             splats[slot] = SplatShape(vec4(p.center, p.opacity, p.depth), vec4(p.conic, 0.0));
             if instance.debug >= DEBUG_ACTIVE {
                 seen = vec4(debug_color(p), 0.0);
@@ -94,7 +124,6 @@ fn project_and_bin(first_of_group: u32, place: u32, count: u32, thread: u32) {
             covered = p.tiles;
             place_of_visible = atomicAdd(&own_visible, 1u);
             atomicAdd(&own_pairs, (covered.z - covered.x) * (covered.w - covered.y));
-            key = depth_order(p.depth);
         }
     }
     let own_bins = count_splat(filling, covered, key, slot);

@@ -16,7 +16,7 @@ use super::shaders::ColorPrecision;
 use super::shaders::{Pixels, SHADERS, ShaderChecks, Storage};
 #[cfg(feature = "bevy")]
 use super::tile_bins::Blending;
-use super::tile_bins::{BinVariant, Lists};
+use super::tile_bins::{BinVariant, Lists, Scratch};
 use super::work::WorkCounters;
 use std::sync::Arc;
 #[cfg(feature = "bevy")]
@@ -38,6 +38,8 @@ pub struct Renderer {
     pub(super) is_software: bool,
     /// Bound instead of a list of active Gaussians if all Gaussians are drawn.
     pub(super) no_list: wgpu::BindGroup,
+    /// The working buffers that views share.
+    pub(super) scratch: Scratch,
     work: WorkCounters,
 }
 
@@ -69,6 +71,7 @@ impl Renderer {
             is_software: software,
             no_list: allocator.bind_group("gs4d no active list", &layouts.active, &[no_list.as_entire_binding()]),
             layouts,
+            scratch: Scratch::default(),
             work,
         })
     }

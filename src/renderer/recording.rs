@@ -63,7 +63,7 @@ impl Recording<'_> {
         }
     }
 
-    /// Records `blend` or `blend_blocks`: a workgroup for each tile, which reads the lists of its tile.
+    /// Records `blend`, `find_surfaces` or `blend_blocks`: a workgroup for each tile. `lists` are the pass's own buffers.
     pub(super) fn dispatch_tiles(
         &self,
         pass: &mut wgpu::ComputePass<'_>,
@@ -75,6 +75,5 @@ impl Recording<'_> {
         pass.set_bind_group(0, self.pixel, &[]);
         pass.set_bind_group(1, lists, &[]);
         pass.dispatch_workgroups(tiles.x, tiles.y, 1);
-        self.mark(pass);
     }
 }

@@ -37,6 +37,7 @@ const PASSES: &[Library] = &[
     ("bin", include_str!("../../shaders/global_sort/bin.wgsl")),
     ("ranges", include_str!("../../shaders/global_sort/ranges.wgsl")),
     ("blend", include_str!("../../shaders/global_sort/blend.wgsl")),
+    ("find_surfaces", include_str!("../../shaders/tile_bins/find_surfaces.wgsl")),
     ("project_bin", include_str!("../../shaders/tile_bins/project_bin.wgsl")),
     ("place_bins", include_str!("../../shaders/tile_bins/place_bins.wgsl")),
     ("fill_bins", include_str!("../../shaders/tile_bins/fill_bins.wgsl")),

@@ -15,9 +15,18 @@ pub struct ViewStatistics {
     pub visible: u32,
     /// Number of splat–tile pairs.
     pub pairs: u32,
-    /// Bytes of the view's working buffers and targets.
+    /// Bytes of the view's own working buffers and targets.
     pub bytes: u64,
+    /// Bytes of the working buffers that all views share, since they are drawn one after another.
+    pub shared_bytes: u64,
     /// GPU time of each pass, in frame order; a single time named `frame` if the device has no timestamps inside passes; empty until it has
     /// been measured.
     pub passes: Vec<PassTime>,
+}
+
+impl ViewStatistics {
+    /// Returns the bytes of the view's own buffers and targets, and of the shared ones.
+    pub(crate) fn all_bytes(&self) -> u64 {
+        self.bytes + self.shared_bytes
+    }
 }

@@ -1,16 +1,21 @@
-//! The end of lists behind opaque surfaces.
+//! Work that is saved behind opaque surfaces.
 //!
-//! In: a list of `blend_blocks` in which splats behind a surface precede splats in front of it, as no sorted list has them. Out: proof that a
-//! pixel visits no batch after the first whose last splat is hidden: it does not show the later splats. Skipped where there is no GPU.
+//! In: a list of `blend_blocks` in which splats behind a surface precede splats in front of it, as no sorted list has them; depth textures for
+//! `find_surfaces`; scenes behind walls. Out: proof that a pixel visits no batch after the first whose last splat is hidden: it does not show the
+//! later splats; the farthest surface of each tile; that splats behind a wall are left out before they are sorted, and no others. Skipped where
+//! there is no GPU.
 
 use crate::support::composed::compose;
 use crate::support::gpu;
 use crate::support::surfaces::{depth_texture, edge};
 use bevy_gs4d::internal::renderer::layout::{FrameUniforms, SplatShape, VisibleSplat};
+use bevy_gs4d::internal::renderer::shaders::MULTISAMPLED;
 use bevy_gs4d::internal::renderer::tile_bins::{Blending, EIGHT_AT_ONCE, LARGE_BATCHES};
-use bevy_gs4d::renderer::GpuContext;
+use bevy_gs4d::renderer::{Design, GpuContext, Instance, OpaqueDepth, ViewParameters};
+use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use bevy_gs4d::view::{Appearance, Background, Camera, RasterFov};
 use bytemuck::{Pod, Zeroable};
-use glam::UVec2;
+use glam::{UVec2, Vec3};
 use std::borrow::Cow;
 use wgpu::util::DeviceExt;
 
@@ -24,6 +29,66 @@ const NEAR: f32 = 0.1;
 const SURFACE: f32 = 1.0;
 const BEHIND: f32 = 2.0;
 const IN_FRONT: f32 = 0.5;
+
+/// Returns the depth of the farthest surface of each tile, by `find_surfaces`. `size` is that of the picture, its tiles, and the samples of the surface.
+fn find_surfaces(
+    context: &GpuContext,
+    definitions: &[&str],
+    surface: &wgpu::TextureView,
+    (size, tiles, samples): (UVec2, UVec2, u32),
+) -> Vec<f32> {
+    let GpuContext { device, queue, .. } = context;
+    let source = wgpu::ShaderSource::Naga(Cow::Owned(compose("find_surfaces", definitions).expect("it composes")));
+    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: None, source });
+    let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        label: None,
+        layout: None,
+        module: &module,
+        entry_point: Some("find_surfaces"),
+        compilation_options: wgpu::PipelineCompilationOptions::default(),
+        cache: None,
+    });
+    let frame = FrameUniforms {
+        size: size.to_array(),
+        tiles: tiles.to_array(),
+        opaque_samples: samples,
+        opaque_distance: [NEAR, 0.0, 0.0, 1.0],
+        ..FrameUniforms::zeroed()
+    };
+    let frame = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+        label: None,
+        contents: bytemuck::bytes_of(&frame),
+        usage: wgpu::BufferUsages::UNIFORM,
+    });
+    let buffer = |usage| {
+        let size = u64::from(4 * tiles.element_product());
+        device.create_buffer(&wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false })
+    };
+    let written = buffer(wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC);
+    let copy = buffer(wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST);
+    let group = |index, entries: &[wgpu::BindGroupEntry<'_>]| {
+        let layout = &pipeline.get_bind_group_layout(index);
+        device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries })
+    };
+    let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
+    let pixels = [entry(0, frame.as_entire_binding()), entry(2, wgpu::BindingResource::TextureView(surface))];
+    let groups = [group(0, &pixels), group(1, &[entry(0, written.as_entire_binding())])];
+    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    {
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+        pass.set_pipeline(&pipeline);
+        pass.set_bind_group(0, &groups[0], &[]);
+        pass.set_bind_group(1, &groups[1], &[]);
+        pass.dispatch_workgroups(tiles.x, tiles.y, 1);
+    }
+    encoder.copy_buffer_to_buffer(&written, 0, &copy, 0, copy.size());
+    queue.submit([encoder.finish()]);
+    copy.slice(..).map_async(wgpu::MapMode::Read, |mapped| mapped.expect("the copy can be mapped"));
+    device.poll(wgpu::PollType::wait_indefinitely()).expect("the device finishes");
+    let orders: Vec<u32> = bytemuck::pod_collect_to_vec(&copy.slice(..).get_mapped_range());
+    // The inverse of `depth_order` for positive depths.
+    orders.into_iter().map(|order| f32::from_bits(order ^ 0x8000_0000)).collect()
+}
 
 /// Blends a list whose first batch is behind the surface and whose other splats are in front of it. Returns the red of each pixel.
 fn blend(context: &GpuContext, definitions: &[&str], surface: &wgpu::TextureView, samples: u32) -> Vec<f32> {
@@ -125,6 +190,69 @@ fn blend(context: &GpuContext, definitions: &[&str], surface: &wgpu::TextureView
     device.poll(wgpu::PollType::wait_indefinitely()).expect("the device finishes");
     let read = copy.slice(..).get_mapped_range().to_vec();
     read.chunks_exact(16).map(|pixel| bytemuck::pod_read_unaligned(&pixel[..4])).collect()
+}
+
+#[test]
+fn find_surfaces_finds_the_farthest_surface_of_each_tile() {
+    let Some(headless) = gpu::headless() else { return };
+    let context = headless.context();
+    // The last row and column of tiles are not whole.
+    let size = UVec2::new(75, 40);
+    let tiles = UVec2::new(5, 3);
+    let is_at = |found: f32, depth: f32| (found / depth - 1.0).abs() < 1e-5;
+    const FAR: f32 = 3.4e38;
+    let whole = depth_texture(context, size, NEAR / SURFACE);
+    let found = find_surfaces(context, &[], &whole, (size, tiles, 1));
+    assert_eq!(found.len(), 15, "a depth for each tile");
+    let is_wall = found.iter().all(|&found| is_at(found, SURFACE));
+    assert!(is_wall, "a wall before everything; pixels outside the picture do not count: {found:?}");
+    let found = find_surfaces(context, &[], &whole, (size, tiles, 0));
+    assert!(found.iter().all(|&found| is_at(found, FAR)), "no surfaces: {found:?}");
+    let (samples, column) = edge(context, size, NEAR, SURFACE, 0.0);
+    let samples = samples.create_view(&wgpu::TextureViewDescriptor::default());
+    let found = find_surfaces(context, MULTISAMPLED, &samples, (size, tiles, 4));
+    for (tile, found) in found.into_iter().enumerate() {
+        let end = 16 * (tile as u32 % tiles.x + 1);
+        let expected = if end <= column { SURFACE } else { FAR };
+        assert!(is_at(found, expected), "tile {tile}: {found}, expected {expected}: a sample without a surface is far");
+    }
+}
+
+#[test]
+fn splats_that_surfaces_hide_are_left_out_before_they_are_sorted() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let scene = synthesize(&SynthSettings { count: 3_000, ..SynthSettings::default() });
+    let scene = scene.into_runtime().expect("a scene that can be drawn");
+    let capture = headless.upload(&scene).expect("the scene fits");
+    let size = UVec2::new(190, 120);
+    let camera = Camera::look_at(Vec3::new(2.0, 1.0, 1.2), Vec3::ZERO, Vec3::Z, 0.8, size);
+    let view = camera.view(0.4, RasterFov::Reference);
+    let instances = [Instance { capture: &capture, active: None, view, appearance: Appearance::default() }];
+    let background = Background::Color([0.3, 0.2, 0.1]);
+    let open = ViewParameters { background, depths: false, ..ViewParameters::default() };
+    headless.set_design(Design::TileBins);
+    let all = headless.render_all(&instances, &open).expect("the picture fits").counts;
+    assert!(all.visible > 1_000, "the scene is visible without a wall: {all:?}");
+    for (samples, distance) in [(1, 0.2), (4, 0.2), (1, 2.4), (4, 2.4)] {
+        let texture = match samples {
+            1 => depth_texture(headless.context(), size, NEAR / distance),
+            _ => edge(headless.context(), size, NEAR, distance, 0.3).0.create_view(&Default::default()),
+        };
+        let opaque = OpaqueDepth { texture: &texture, samples, origin: UVec2::ZERO, distance: [NEAR, 0.0, 0.0, 1.0] };
+        let behind = ViewParameters { opaque: Some(opaque), ..open };
+        let [expected, found] = [Design::GlobalSort, Design::TileBins].map(|design| {
+            headless.set_design(design);
+            headless.render_all(&instances, &behind).expect("the picture fits")
+        });
+        let what = format!("{samples} samples at {distance}");
+        let apart = |(a, b): (&Vec3, &Vec3)| (*a - *b).abs().max_element();
+        let apart = found.picture.pixels.iter().zip(&expected.picture.pixels).map(apart).fold(0.0, f32::max);
+        assert!(apart <= 1e-5, "{what}: the picture differs by {apart}");
+        match (samples, distance < 1.0) {
+            (1, true) => assert_eq!(found.counts.visible, 0, "{what}: nothing is sorted behind a wall"),
+            _ => assert!((1..all.visible).contains(&found.counts.visible), "{what}: some are left: {:?}", found.counts),
+        }
+    }
 }
 
 #[test]

@@ -7,7 +7,9 @@ use crate::support::composed::{compose, pass_names};
 use bevy_gs4d::internal::offline::shaders::{ATOMIC_SUMS, COMPAT, COMPAT_WITHOUT_TIME};
 use bevy_gs4d::internal::renderer::global_sort::AtOnce;
 use bevy_gs4d::internal::renderer::shaders::{BINNED, COPIED_INSTANCE, MULTISAMPLED, SHADERS, SUBGROUPS_OF_32};
-use bevy_gs4d::internal::renderer::tile_bins::{Blending, COUNTED, EIGHT_AT_ONCE, FEW_BINS, LARGE_BATCHES, Lists};
+use bevy_gs4d::internal::renderer::tile_bins::{
+    Blending, COUNTED, EIGHT_AT_ONCE, FEW_BINS, LARGE_BATCHES, Lists, OPAQUE,
+};
 use bevy_gs4d::renderer::{ColorPrecision, Storage};
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 use std::collections::BTreeSet;
@@ -151,7 +153,8 @@ fn no_entry_point_has_a_reserved_name() {
 /// Devices of browsers have at least 8 storage buffers for a stage.
 #[test]
 fn no_pass_of_a_page_uses_more_than_eight_storage_buffers() {
-    for (name, definitions) in passes_of_pages() {
+    let behind = Storage::ALL.map(|storage| ("project_bin", [OPAQUE, storage.definitions()].concat()));
+    for (name, definitions) in passes_of_pages().chain(behind) {
         let module = compose(name, &definitions).expect("the pass composes");
         let mut validator = Validator::new(ValidationFlags::all(), Capabilities::all());
         let info = validator.validate(&module).expect("the pass is valid");

@@ -204,7 +204,14 @@ fn every_variant_of_blending_matches_the_reference_design() {
                     let difference = difference(&found, &expected);
                     println!("{what}: {difference:.1e}");
                     assert!(difference <= 1e-5, "{what}: differs by {difference}");
-                    assert_eq!(found.counts, expected.counts, "{what}: the counts are the same");
+                    // Splats that are hidden in all of their tiles are left out of frames without depths.
+                    let shows_color = matches!(debug, DebugView::Color | DebugView::Velocity);
+                    if opaque.is_some() && shows_color && !depths {
+                        let [left, all] = [found.counts.visible, expected.counts.visible];
+                        assert!(0 < left && left < all, "{what}: {left} of {all} splats are left");
+                    } else {
+                        assert_eq!(found.counts, expected.counts, "{what}: the counts are the same");
+                    }
                 }
             }
         }

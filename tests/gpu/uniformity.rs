@@ -7,7 +7,7 @@
 use crate::support::composed::{compose, pass_names};
 use bevy_gs4d::internal::renderer::global_sort::AtOnce;
 use bevy_gs4d::internal::renderer::shaders::{COPIED_INSTANCE, MULTISAMPLED};
-use bevy_gs4d::internal::renderer::tile_bins::{Blending, COUNTED, EIGHT_AT_ONCE, LARGE_BATCHES, Lists};
+use bevy_gs4d::internal::renderer::tile_bins::{Blending, COUNTED, EIGHT_AT_ONCE, LARGE_BATCHES, Lists, OPAQUE};
 use bevy_gs4d::renderer::Storage;
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -263,12 +263,13 @@ fn no_barrier_depends_on_a_value_that_differs_between_threads() {
         .flat_map(|lists| [&[][..], COUNTED].map(|counted| ("sort_bins", [lists.definitions(), counted].concat())));
     let at_once = AtOnce::ALL.into_iter().map(|at_once| ("blend", [at_once.definitions(), MULTISAMPLED].concat()));
     let readers = Storage::ALL.into_iter().flat_map(|storage| {
-        [("project_bin", &[][..]), ("colors", COPIED_INSTANCE)]
+        [("project_bin", &[][..]), ("project_bin", OPAQUE), ("colors", COPIED_INSTANCE)]
             .map(|(name, own)| (name, [own, storage.definitions()].concat()))
     });
+    let surfaces = ("find_surfaces", MULTISAMPLED.to_vec());
     let eight = ("blend_blocks", [Blending::ColorBehindSurfaces.definitions(), EIGHT_AT_ONCE].concat());
     let plain = pass_names().map(|name| (name, Vec::new()));
-    let all = plain.chain(blending).chain(lists).chain(at_once).chain(readers).chain([eight]);
+    let all = plain.chain(blending).chain(lists).chain(at_once).chain(readers).chain([surfaces, eight]);
     let faults: Vec<String> = all.flat_map(|(name, definitions)| faults(name, &definitions)).collect();
     assert!(faults.is_empty(), "{} faults:\n{}", faults.len(), faults.join("\n"));
 }

@@ -13,4 +13,6 @@ pub(super) fn show(ui: &mut egui::Ui, statistics: &CaptureStatistics, view: Opti
     ui.label(format!("captures: {} in {captures}", presentation::bytes(scenes)));
     let working = view.map_or(0, |view| view.bytes);
     ui.label(format!("working memory of this view: {}", presentation::bytes(working)));
+    let shared = view.map_or(0, |view| view.shared_bytes);
+    ui.label(format!("working memory of all views: {}", presentation::bytes(shared)));
 }

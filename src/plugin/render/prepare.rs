@@ -316,13 +316,13 @@ impl Preparation<'_, '_, '_> {
         camera: &CameraItem<'_>,
         poses: [CameraPose; 2],
     ) -> Result<(), GpuError> {
-        let bytes = state.renderer.statistics().bytes;
+        let bytes = state.renderer.statistics().all_bytes();
         let device = self.device.wgpu_device();
         let (prepared, mut caught) = catch(device, bytes, || self.write(state, camera, poses));
         match caught.poll() {
             Some(result) => result?,
             // A bind group alone is not worth a frame without captures.
-            None if state.renderer.statistics().bytes != bytes => state.pending = Some(caught),
+            None if state.renderer.statistics().all_bytes() != bytes => state.pending = Some(caught),
             None => {}
         }
         prepared?;

@@ -23,7 +23,11 @@ pub(super) fn publish_statistics(
         let all = view.renderer.statistics();
         let numbers = match view.sees_something() {
             true => Cow::Borrowed(all),
-            false => Cow::Owned(ViewStatistics { bytes: all.bytes, ..ViewStatistics::default() }),
+            false => Cow::Owned(ViewStatistics {
+                bytes: all.bytes,
+                shared_bytes: all.shared_bytes,
+                ..ViewStatistics::default()
+            }),
         };
         (view.camera, numbers)
     });

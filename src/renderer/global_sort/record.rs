@@ -65,6 +65,7 @@ impl SortBuffers {
 
         // blend
         frame.dispatch_tiles(pass, blend, &self.blend);
+        frame.mark(pass);
     }
 
     /// Records one step of `sort`. `blocks` is the number of workgroups; if it is unknown on the host, the dispatch is

@@ -75,7 +75,7 @@ impl Headless {
             wall_milliseconds: median(alone),
             pipelined_milliseconds: untimed.wall_milliseconds,
             encode_milliseconds: untimed.encode_milliseconds,
-            bytes: self.view.statistics().bytes,
+            bytes: self.view.statistics().all_bytes(),
             active: median(active_counts) as u32,
             counts: Counts { visible: middle(|c| c.visible), pairs: middle(|c| c.pairs) },
             frames,

@@ -53,9 +53,9 @@ pub(super) fn stamp(frame: u32) -> u32 {
     frame % STAMPS + 1
 }
 
-/// Returns whether the stamps repeat from a frame on: splats with stamps of earlier frames must be cleared before it.
-pub(super) fn stamps_repeat(frame: u32) -> bool {
-    frame.is_multiple_of(STAMPS)
+/// Returns the round of stamps of a frame: in another round the same stamps belong to other frames.
+pub(super) fn stamp_round(frame: u32) -> u32 {
+    frame / STAMPS
 }
 
 /// Pictures of up to this number of tiles do not occupy the GPU, so that large batches of `blend_blocks` are faster.
@@ -125,13 +125,14 @@ mod tests {
     }
 
     #[test]
-    fn the_stamps_between_two_clears_are_distinct_and_not_zero() {
+    fn the_stamps_of_a_round_are_distinct_and_not_zero() {
         // Around the repetition of stamps, and of the 32-bit frame number.
         for first in [0, u32::MAX - STAMPS - 10] {
             let mut seen = std::collections::HashSet::new();
+            let mut round = stamp_round(first);
             for step in 0..2 * STAMPS + 100 {
                 let frame = first.wrapping_add(step);
-                if stamps_repeat(frame) {
+                if std::mem::replace(&mut round, stamp_round(frame)) != round {
                     seen.clear();
                 }
                 assert!(

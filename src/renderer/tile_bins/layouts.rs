@@ -9,6 +9,8 @@ use crate::renderer::layout::{FrameUniforms, INSTANCES_BOUND, MotionUniforms};
 /// Bind group layouts, in the order of the shaders' bindings.
 #[derive(Debug)]
 pub(in crate::renderer) struct BinLayouts {
+    /// Of `find_surfaces`, after the group of the pixels.
+    pub find_surfaces: wgpu::BindGroupLayout,
     pub project_bin: wgpu::BindGroupLayout,
     /// Of `place_bins` and `fill_bins`.
     pub fill_bins: wgpu::BindGroupLayout,
@@ -25,7 +27,8 @@ impl BinLayouts {
         const BEFORE: Bind = UniformAt(size_of::<MotionUniforms>());
         let new = |label, bindings: &[Bind]| group_layout(device, label, bindings);
         Self {
-            project_bin: new("gs4d project_bin", &[INSTANCE, Write, Write, Write, Write]),
+            find_surfaces: new("gs4d find_surfaces", &[Write]),
+            project_bin: new("gs4d project_bin", &[INSTANCE, Write, Write, Write, Write, Read]),
             fill_bins: new("gs4d fill_bins", &[FRAME, Read, Write, Write, Read]),
             // The shader does not read the last but one buffer, the list of the visible splats. Because it is bound, the memory barrier for the
             // buffers that `project_bin` writes and `colors` reads comes before `sort_bins`, not between `sort_bins` and `colors`, so that

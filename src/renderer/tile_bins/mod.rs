@@ -9,6 +9,9 @@
 //! | `colors` | visible splats, color coefficients | colors of splats |
 //! | `blend_blocks` | pairs, splats and their colors, opaque depth | color and transmittance, expected and median depth |
 //!
+//! In frames behind opaque surfaces, without depths, `find_surfaces` first finds the farthest surface of each tile, and `project_bin` leaves out
+//! the splats that are hidden in all of their tiles.
+//!
 //! Each bin is sorted by one workgroup, in workgroup memory. `blend_blocks` blends each tile in blocks of 8 x 4 pixels.
 //!
 //! All bins have room for as many splats as the fullest bin of earlier frames, and a reserve. Where this would take too much memory, since few bins
@@ -18,6 +21,8 @@
 //! |---|---|---|
 //! | `place_bins` | number of splats of each bin | place of each bin among the entries of all bins |
 //! | `fill_bins` | list of the visible splats, splats, places of bins | unordered bins |
+//!
+//! All views of a device share the buffers of splats, pairs and entries ([`Scratch`]): views are drawn one after another.
 //!
 //! `sort_bins` then copies the entries of long bins in order of parts before it sorts part by part, so that its time grows in proportion to them.
 //!
@@ -30,6 +35,7 @@ mod layouts;
 mod loops;
 mod passes;
 mod record;
+mod scratch;
 mod state;
 mod variant;
 
@@ -38,9 +44,10 @@ pub(super) use buffers::BinBuffers;
 pub(super) use layouts::BinLayouts;
 pub(super) use loops::{Crowd, is_complete};
 pub(super) use passes::BinPasses;
+pub(super) use scratch::Scratch;
 pub(super) use state::{BinRoom, BinState};
 pub(super) use variant::BinVariant;
-pub use variant::{Blending, COUNTED, EIGHT_AT_ONCE, FEW_BINS, LARGE_BATCHES, Lists};
+pub use variant::{Blending, COUNTED, EIGHT_AT_ONCE, FEW_BINS, LARGE_BATCHES, Lists, OPAQUE};
 
 /// Names of the timed passes of a frame, in order. The last two are the passes of motions.
 pub(super) const TIMED_PASSES: &[&str] =

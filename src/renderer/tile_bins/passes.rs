@@ -2,7 +2,7 @@
 //!
 //! In: a device, the variants that a view draws with. Out: pipelines; an error if the device refuses one, which is not kept.
 
-use super::variant::{BinVariant, FEW_BINS};
+use super::variant::BinVariant;
 use crate::renderer::compiler::Compiler;
 use crate::renderer::error::GpuError;
 use crate::renderer::shaders::Storage;
@@ -12,8 +12,11 @@ use std::sync::{Arc, OnceLock};
 #[derive(Debug)]
 pub(in crate::renderer) struct BinPasses {
     compiler: Arc<Compiler>,
-    /// Indexed by whether there are few bins, by whether instances are copied, and by the storage of the capture (order of [`Storage::ALL`]).
-    project_bin: [[[OnceLock<wgpu::ComputePipeline>; 3]; 2]; 2],
+    /// In the order of [`Pixels::ALL`].
+    find_surfaces: [OnceLock<wgpu::ComputePipeline>; 4],
+    /// Indexed by whether hidden splats are left out, by whether there are few bins, by whether instances are copied, and by the storage of the
+    /// capture (order of [`Storage::ALL`]).
+    project_bin: [[[[OnceLock<wgpu::ComputePipeline>; 3]; 2]; 2]; 2],
     /// Indexed by whether instances are copied, and by the storage.
     colors: [[OnceLock<wgpu::ComputePipeline>; 3]; 2],
     /// `place_bins` and `fill_bins`.
@@ -29,6 +32,7 @@ impl BinPasses {
     pub(in crate::renderer) fn new(compiler: Arc<Compiler>) -> Self {
         Self {
             compiler,
+            find_surfaces: Default::default(),
             project_bin: Default::default(),
             colors: Default::default(),
             counted: OnceLock::new(),
@@ -53,16 +57,22 @@ impl BinPasses {
             let [geometry, color] = &layouts.captures[storage as usize];
             let (definitions, copied) = compiler.reading(storage, batched);
             if self.project_bin(storage, batched, variant).is_none() {
-                let few = if variant.few_bins { FEW_BINS } else { &[] };
                 let groups = [&own.project_bin, geometry, &layouts.active].map(Some);
-                let made = compiler.pass(device, "project_bin", &[few, &definitions[..]].concat(), &groups)?;
-                self.project_bin[usize::from(variant.few_bins)][copied][storage as usize].get_or_init(|| made);
+                let definitions = [variant.project_definitions(), definitions.clone()].concat();
+                let made = compiler.pass(device, "project_bin", &definitions, &groups)?;
+                self.project_bins(variant)[copied][storage as usize].get_or_init(|| made);
             }
             if self.colors(storage, batched).is_none() {
                 let groups = [Some(&own.colors), Some(geometry), None, Some(color)];
                 let made = compiler.pass(device, "colors", &definitions, &groups)?;
                 self.colors[copied][storage as usize].get_or_init(|| made);
             }
+        }
+        if variant.blending.leaves_out_hidden() && self.find_surfaces(variant).is_none() {
+            let pixels = variant.pixels();
+            let groups = [&layouts.pixel[pixels.index()], &own.find_surfaces].map(Some);
+            let made = compiler.pass(device, "find_surfaces", &pixels.definitions(), &groups)?;
+            self.find_surfaces[pixels.index()].get_or_init(|| made);
         }
         if variant.counted && self.counted().is_none() {
             let pass = |name| compiler.pass(device, name, &[], &[Some(&own.fill_bins)]);
@@ -83,6 +93,16 @@ impl BinPasses {
         Ok(())
     }
 
+    /// Returns `find_surfaces`, if it has been compiled.
+    pub(super) fn find_surfaces(&self, variant: BinVariant) -> Option<&wgpu::ComputePipeline> {
+        self.find_surfaces[variant.pixels().index()].get()
+    }
+
+    /// Returns the pipelines of `project_bin` of a variant.
+    fn project_bins(&self, variant: BinVariant) -> &[[OnceLock<wgpu::ComputePipeline>; 3]; 2] {
+        &self.project_bin[usize::from(variant.blending.leaves_out_hidden())][usize::from(variant.few_bins)]
+    }
+
     /// Returns `project_bin` for this storage, for one or several instances in a dispatch, if it has been compiled.
     pub(super) fn project_bin(
         &self,
@@ -90,7 +110,7 @@ impl BinPasses {
         batched: bool,
         variant: BinVariant,
     ) -> Option<&wgpu::ComputePipeline> {
-        self.project_bin[usize::from(variant.few_bins)][self.compiler.copied(batched)][storage as usize].get()
+        self.project_bins(variant)[self.compiler.copied(batched)][storage as usize].get()
     }
 
     /// Returns `colors` for this storage, for one or several instances in a dispatch, if it has been compiled.
@@ -123,6 +143,7 @@ impl BinPasses {
             self.project_bin(storage, batched, variant).is_some() && self.colors(storage, batched).is_some()
         };
         let fills = !variant.counted || self.counted().is_some();
-        fills && self.sort_bins(variant).is_some() && self.blend_blocks(variant).is_some() && drawn.all(reads)
+        let finds = !variant.blending.leaves_out_hidden() || self.find_surfaces(variant).is_some();
+        fills && finds && self.sort_bins(variant).is_some() && self.blend_blocks(variant).is_some() && drawn.all(reads)
     }
 }

@@ -1,4 +1,4 @@
-//! The passes of tile bins, from `project_bin` to `blend_blocks`.
+//! The passes of tile bins, from `find_surfaces` to `blend_blocks`.
 //!
 //! In: a prepared view. Out: the passes, recorded into the compute pass of the frame.
 //!
@@ -7,7 +7,7 @@
 //! odd frames are in separate buffers, and so are splats and their colors. The bins are sorted first, since `sort_bins` occupies few threads
 //! for a long time: `colors` uses the remaining threads.
 
-use super::bins::{per_thread, stamps_repeat};
+use super::bins::per_thread;
 use super::buffers::BinBuffers;
 use super::state::BinState;
 use crate::renderer::layout::BIN_COUNTERS;
@@ -46,8 +46,9 @@ impl BinBuffers {
             let first = u64::from(BIN_COUNTERS - 2) * 4;
             encoder.clear_buffer(&self.bins[state.parity()], first, Some(8));
         }
-        if stamps_repeat(state.frames) {
-            encoder.clear_buffer(&self.visible, 0, None);
+        let shared = &self.claim.buffers;
+        if shared.begins_round(state.frame) {
+            encoder.clear_buffer(&shared.visible, 0, None);
         }
     }
 
@@ -62,6 +63,12 @@ impl BinBuffers {
     ) {
         let passes = &frame.renderer.passes.tile_bins;
         let parity = state.parity();
+        // find_surfaces
+        if state.variant.blending.leaves_out_hidden() {
+            let Some(find_surfaces) = passes.find_surfaces(state.variant) else { return };
+            frame.dispatch_tiles(pass, find_surfaces, &self.find_surfaces);
+        }
+
         // project_bin
         let pipeline = |storage, batched| passes.project_bin(storage, batched, state.variant);
         let groups = |_, count: u32| count.div_ceil(256 * per_thread(count));
@@ -100,5 +107,6 @@ impl BinBuffers {
 
         // blend_blocks
         frame.dispatch_tiles(pass, blend_blocks, &self.blend_blocks);
+        frame.mark(pass);
     }
 }

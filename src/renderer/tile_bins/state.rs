@@ -17,8 +17,8 @@ pub(in crate::renderer) struct BinState {
     pub variant: BinVariant,
     /// Whether the counters of odd frames are used.
     pub odd: bool,
-    /// Number of frames that have been recorded.
-    pub frames: u32,
+    /// Number of the frame among those of all views.
+    pub frame: u32,
     /// Number of splats of the fullest bin of an earlier frame.
     pub fullest: u32,
     /// Number of bins that the frame recorded last has cleared for the next frame.
@@ -33,7 +33,7 @@ impl Default for BinState {
             side: 1,
             variant: BinVariant::default(),
             odd: false,
-            frames: 0,
+            frame: 0,
             fullest: 0,
             cleared: 0,
             room: BinRoom::default(),
@@ -59,7 +59,7 @@ impl BinState {
 
     /// Returns the uniform `binning` of a part in a picture.
     pub(in crate::renderer) fn uniform(&self, sizes: &Sizes, picture: UVec2, part: u32) -> [u32; 4] {
-        [self.side | (stamp(self.frames) << 8), self.capacity(sizes, picture), part, sizes.parts]
+        [self.side | (stamp(self.frame) << 8), self.capacity(sizes, picture), part, sizes.parts]
     }
 
     /// Returns the capacity of each bin of a picture; 0 if bins are counted before they are filled.

@@ -108,6 +108,11 @@ impl Blending {
         matches!(self, Self::All | Self::AllMultisampled)
     }
 
+    /// Returns whether splats that opaque surfaces hide are left out before they are sorted.
+    pub(in crate::renderer) fn leaves_out_hidden(self) -> bool {
+        matches!(self, Self::ColorBehindSurfaces | Self::ColorBehindSamples)
+    }
+
     /// Returns whether the opaque depth is multisampled.
     pub(in crate::renderer) fn is_multisampled(self) -> bool {
         matches!(self, Self::ColorBehindSamples | Self::AllMultisampled)
@@ -119,6 +124,9 @@ pub const COUNTED: &[&str] = &["COUNTED"];
 
 /// Definitions of `project_bin` for at most 512 bins.
 pub const FEW_BINS: &[&str] = &["FEW_BINS"];
+
+/// The definition of `project_bin` for frames behind opaque surfaces.
+pub const OPAQUE: &[&str] = &["OPAQUE"];
 
 /// The number of counters of bins with [`FEW_BINS`].
 pub(super) const FEW_BINS_LIMIT: u32 = 512;
@@ -142,6 +150,12 @@ impl BinVariant {
     /// Returns the index of its `blend_blocks`, below [`BLENDS`](Self::BLENDS).
     pub(in crate::renderer) fn blend_index(self) -> usize {
         (self.blending as usize * 2 + self.precision as usize) * 2 + usize::from(self.large_batches)
+    }
+
+    /// Returns the definitions of `project_bin`.
+    pub(in crate::renderer) fn project_definitions(self) -> Vec<&'static str> {
+        let few = if self.few_bins { FEW_BINS } else { &[] };
+        [few, if self.blending.leaves_out_hidden() { OPAQUE } else { &[] }].concat()
     }
 
     /// Returns the definitions of `sort_bins`.

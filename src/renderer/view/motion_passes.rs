@@ -47,5 +47,6 @@ impl ViewRenderer {
 
         // blend or blend_blocks. `blend` writes the same depths again.
         Recording { pixel: &motion.pixel, ..*frame }.dispatch_tiles(pass, blend, lists);
+        frame.mark(pass);
     }
 }

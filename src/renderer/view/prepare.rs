@@ -4,7 +4,7 @@
 
 use super::motion::MotionResources;
 use super::parameters::{Instance, ViewParameters};
-use super::resources::Resources;
+use super::resources::{DesignBuffers, Resources};
 use super::sizes::{Sizes, grown, max_pairs};
 use super::view_renderer::ViewRenderer;
 use crate::renderer::active::{drawn_count, most_at_once, most_drawn};
@@ -103,7 +103,6 @@ impl ViewRenderer {
         };
         if std::mem::take(&mut self.recorded) {
             self.bins.odd = !self.bins.odd;
-            self.bins.frames = self.bins.frames.wrapping_add(1);
         }
         let made = self.resources.as_ref().map(|resources| resources.sizes).unwrap_or_default();
         let parts: usize = instances.iter().map(|instance| instance.capture.parts.len()).sum();
@@ -132,13 +131,14 @@ impl ViewRenderer {
         let opaque_view = opaque.map_or(&self.no_depth, |depth| depth.texture).clone();
         let environment_buffer = environment.map_or(&self.no_environment, |(_, map)| &map.buffer).clone();
         match &mut self.resources {
-            Some(made) if made.sizes == sizes && made.pixels == self.pixels => {
+            Some(made) if made.sizes == sizes && made.pixels == self.pixels && made.shares_current(renderer) => {
                 let allocator = renderer.allocator(device);
                 made.bind_pixel(allocator, &renderer.layouts, &self.frame, opaque_view, environment_buffer);
             }
             _ => {
                 self.bins.odd = false;
-                self.motion = None;
+                // The old buffers are freed, and what they claim of the shared ones, before new ones are created.
+                (self.motion, self.resources) = (None, None);
                 self.resources = Some(Resources::new(
                     renderer,
                     device,
@@ -152,12 +152,16 @@ impl ViewRenderer {
                 ));
             }
         }
+        if let Some(DesignBuffers::TileBins(buffers)) = self.resources.as_ref().map(|made| &made.buffers) {
+            self.bins.frame = buffers.next_frame();
+        }
         let active =
             |i: &Instance<'_>| (0..i.capture.parts.len()).map(|at| drawn_count(i.capture, at, i.active)).sum::<u32>();
         self.slots = instances.iter().map(active).sum();
         self.prepare_motion(device, queue, renderer, instances, parameters)?;
         self.statistics.bytes = self.resources.as_ref().map_or(0, |made| made.bytes)
             + self.motion.as_ref().map_or(0, MotionResources::bytes);
+        self.statistics.shared_bytes = self.resources.as_ref().map_or(0, Resources::shared_bytes);
         self.statistics.total = sum(|instance| instance.capture.len());
         self.statistics.active = self.slots;
         self.write_uniforms(queue, instances, parameters, environment.map(|(i, m)| (i.view, i.appearance, m.size)));

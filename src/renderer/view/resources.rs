@@ -19,7 +19,7 @@ use wgpu::{BindingResource, BufferUsages, TextureFormat};
 #[derive(Debug)]
 pub(super) struct Resources {
     pub sizes: Sizes,
-    /// Bytes of storage buffers and targets.
+    /// Bytes of the view's own storage buffers and targets.
     pub bytes: u64,
     pub instances: wgpu::Buffer,
     pub color: wgpu::Texture,
@@ -73,7 +73,7 @@ impl Resources {
                 (DesignBuffers::GlobalSort(buffers), bytes)
             }
             Design::Auto | Design::TileBins => {
-                let buffers = BinBuffers::new(allocator, layouts, sizes, frame, instance);
+                let buffers = BinBuffers::new(allocator, layouts, &renderer.scratch, sizes, frame, instance);
                 let bytes = buffers.bytes;
                 (DesignBuffers::TileBins(buffers), bytes)
             }
@@ -98,6 +98,22 @@ impl Resources {
             pixels,
             pixel,
             buffers,
+        }
+    }
+
+    /// Returns the bytes of the buffers that all views share.
+    pub(super) fn shared_bytes(&self) -> u64 {
+        match &self.buffers {
+            DesignBuffers::TileBins(bins) => bins.claim.bytes(),
+            DesignBuffers::GlobalSort(_) => 0,
+        }
+    }
+
+    /// Returns whether the shared buffers, if the design has any, are those that suit all views.
+    pub(super) fn shares_current(&self, renderer: &Renderer) -> bool {
+        match &self.buffers {
+            DesignBuffers::TileBins(bins) => renderer.scratch.is_current(&bins.claim),
+            DesignBuffers::GlobalSort(_) => true,
         }
     }
 

@@ -12,7 +12,7 @@ use crate::renderer::device::GpuContext;
 use crate::renderer::layout::Counters;
 use crate::renderer::pipelines::Renderer;
 use crate::renderer::shaders::ShaderChecks;
-use crate::renderer::tile_bins::{BinVariant, Blending, Lists, MAX_SLOTS};
+use crate::renderer::tile_bins::{BinBuffers, BinVariant, Blending, Lists, MAX_SLOTS};
 use crate::scene::RuntimeScene;
 use crate::view::{Appearance, Camera, RasterFov, View};
 use glam::{UVec2, Vec3};
@@ -45,6 +45,14 @@ fn gpu() -> Option<Gpu> {
             skip::skip(error);
             None
         }
+    }
+}
+
+/// Returns the buffers of a view that has been prepared.
+fn buffers(view: &ViewRenderer) -> &BinBuffers {
+    match view.resources.as_ref().map(|made| &made.buffers) {
+        Some(DesignBuffers::TileBins(buffers)) => buffers,
+        other => panic!("the view has tile bins, not {other:?}"),
     }
 }
 
@@ -153,9 +161,7 @@ fn the_number_of_pairs_saturates() {
     let expected = [(); 6].map(|()| gpu.draw(&mut view, &capture, 0.0))[5];
     let picture = gpu.picture(&view);
     let next = 1 - view.bins.parity();
-    let made = view.resources.as_ref().expect("a prepared view");
-    let DesignBuffers::TileBins(buffers) = &made.buffers else { panic!("the view has tile bins") };
-    let counters = buffers.bins[next].clone();
+    let counters = buffers(&view).bins[next].clone();
     gpu.context.queue.write_buffer(&counters, 0, &(u32::MAX - 10).to_ne_bytes());
     let found = gpu.draw(&mut view, &capture, 0.0);
     let saturated = Counters { pairs: u32::MAX, padding: 0, ..expected };
@@ -182,11 +188,41 @@ fn splats_of_a_frame_with_the_same_stamp_are_not_drawn() {
     let expected = gpu.picture(&fresh);
     let mut view = gpu.view();
     assert_eq!(gpu.draw(&mut view, &capture, 0.0).visible, 6_000, "all are present at time 0");
-    // As after 65,534 more frames. The bins are still too small for the splats, so that tiles search them.
-    view.bins.frames = 0xfffe;
+    // As after 65,534 more frames of any view. The bins are still too small for the splats, so that tiles search them.
+    buffers(&view).claim.skip_to(view.bins.frame + 0xffff);
     gpu.draw(&mut view, &capture, 1.0);
     let apart = largest_difference(&gpu.picture(&view), &expected);
     assert!(apart <= 1e-6, "the frame with the stamp of the first frame differs by {apart}");
+}
+
+#[test]
+fn views_share_their_buffers_and_draw_as_alone() {
+    let Some(gpu) = gpu() else { return };
+    let captures = [gpu.upload(crowd(200)), gpu.upload(crowd(6_000))];
+    let alone = captures.each_ref().map(|capture| {
+        let mut view = gpu.view();
+        // The buffers have grown by then.
+        for _ in 0..6 {
+            gpu.draw(&mut view, capture, 0.5);
+        }
+        (gpu.picture(&view), view.statistics().shared_bytes)
+    });
+    let [(_, small), (_, large)] = &alone;
+    assert!(large > small, "more splats take more memory: {large} and {small} bytes");
+    let mut views = [gpu.view(), gpu.view()];
+    for frame in 0..8 {
+        for ((view, capture), (expected, _)) in views.iter_mut().zip(&captures).zip(&alone) {
+            gpu.draw(view, capture, 0.5);
+            let apart = largest_difference(&gpu.picture(view), expected);
+            assert!(apart <= 1e-6, "frame {frame} differs by {apart} from that of a view alone");
+        }
+    }
+    let shared = views.each_ref().map(|view| view.statistics().shared_bytes);
+    assert_eq!(shared, [*large; 2], "both views use the same buffers, as large as those of the larger view alone");
+    let [mut left, larger] = views;
+    drop(larger);
+    gpu.draw(&mut left, &captures[0], 0.5);
+    assert_eq!(left.statistics().shared_bytes, *small, "the room of a view that is gone is freed");
 }
 
 #[test]
