@@ -8,6 +8,7 @@ use super::error::ImportError;
 use super::imported::Imported;
 use super::ply;
 use crate::codec::options::{FPS, InvalidOption, ReadOptions};
+use crate::codec::text::printable;
 use crate::gaussian::{Harmonics, SMALLEST_CUTOFF};
 use crate::scene::{ActiveSets, FilterKind, MAX_SEGMENTS, TemporalFilter, UpAxis};
 use std::io;
@@ -170,7 +171,7 @@ impl Losses {
             return;
         }
         if self.frames == 0 {
-            name.clone_into(&mut self.name);
+            self.name = printable(name);
             self.sentences = sentences;
         }
         self.frames += 1;
@@ -263,6 +264,9 @@ mod tests {
         let lost = read(frames(&three).into_iter(), &ReadOptions::default()).expect("three frames").lost;
         assert_eq!(lost.len(), 1, "one sentence for all frames: {lost:?}");
         assert!(lost[0].starts_with("a1.ply and 2 other frames: "), "that says how many: {lost:?}");
+        let lost =
+            read(frames(&[("\u{1b}[2J1.ply", lossy)]).into_iter(), &ReadOptions::default()).expect("a frame").lost;
+        assert!(lost[0].starts_with("\\u{1b}[2J1.ply: "), "a name does not control the terminal: {lost:?}");
     }
 
     #[test]
