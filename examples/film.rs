@@ -1,15 +1,16 @@
 //! Films an island of Bevy's own meshes as a dataset for training: cloth in the wind, petals, a fire, and three kinds of light that cast shadows.
 //!
 //! ```text
-//! cargo run --release --features viewer --example film -- [FOLDER] [--cameras N] [--times N] [--size PIXELS] [--between]
+//! cargo run --release --features viewer --example film -- [FOLDER] [--rig RIG] [--cameras N] [--times N] [--size SIZE] [--test-at FRACTION]
 //! examples/film/island.sh [FOLDER]
 //! ```
 //!
 //! The script films, trains, bakes and evaluates.
 //!
-//! Defaults: the folder `dataset`, 32 cameras on a hemisphere, each with its own offset of the shutter, 96 times over four seconds, square
-//! pictures of 800 pixels. Every eighth camera is for the test, another eighth for validation. `--between` films the cameras of the test alone,
-//! halfway between the times, as pictures that nothing was trained on.
+//! Defaults: the folder `dataset`, 32 cameras on a hemisphere, each with its own offset of the shutter, 96 times over four seconds, pictures of
+//! 800x800. Every eighth camera is for the test, another eighth for validation. `--rig grid` is a rig as of the dataset N3V: 21 cameras in
+//! three rows before the scene, which film at the same moments, the one in the middle for the test. `--test-at` films the cameras of the test
+//! alone, all at once, so far between each time and the next: 0 at the moments of the first camera, 0.5 halfway between them.
 
 #[path = "film/island.rs"]
 mod island;
@@ -21,28 +22,23 @@ use std::io::Write;
 
 /// The header of this file is the text of `--help`.
 const SOURCE: &str = include_str!("film.rs");
-/// Every how many cameras one is for the test.
-const TEST_CAMERAS: usize = 8;
+/// Columns and rows of the grid.
+const GRID: UVec2 = UVec2::new(7, 3);
 
 fn main() -> Result {
-    let (mut folder, [mut cameras, mut times, mut size], mut between) = (None, [32, 96, 800], false);
+    let (mut folder, [mut cameras, mut times], mut size) = (None, [32, 96], UVec2::splat(800));
+    let (mut is_grid, mut test_at) = (false, None);
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
-        let number = match argument.as_str() {
+        match argument.as_str() {
             "--help" | "-h" => {
                 let header = SOURCE.lines().map_while(|line| line.strip_prefix("//!"));
                 header.for_each(|line| println!("{}", line.strip_prefix(' ').unwrap_or(line)));
                 return Ok(());
             }
-            "--between" => {
-                between = true;
-                continue;
-            }
-            "--cameras" => &mut cameras,
-            "--times" => &mut times,
-            "--size" => &mut size,
+            "--rig" | "--cameras" | "--times" | "--size" | "--test-at" => {}
             option if option.starts_with('-') => {
-                return Err(format!("{option}: the options are --cameras, --times, --size and --between").into());
+                return Err(format!("{option}: the options are --rig, --cameras, --times, --size and --test-at").into());
             }
             _ if folder.is_some() => return Err(format!("{argument}: more than one folder; name one").into()),
             _ => {
@@ -50,14 +46,30 @@ fn main() -> Result {
                 continue;
             }
         };
-        let text = arguments.next().ok_or_else(|| format!("{argument} needs a number"))?;
-        *number = text.parse::<u32>().map_err(|_| format!("{argument} {text}: not a number"))?;
+        let text = arguments.next().ok_or_else(|| format!("{argument} needs a value"))?;
+        let number = |text: &str| text.parse::<u32>().map_err(|_| format!("{argument} {text}: not a number"));
+        match argument.as_str() {
+            "--rig" if !["hemisphere", "grid"].contains(&text.as_str()) => {
+                return Err(format!("--rig {text}: the rigs are hemisphere and grid").into());
+            }
+            "--rig" => is_grid = text == "grid",
+            "--cameras" => cameras = number(&text)?,
+            "--times" => times = number(&text)?,
+            "--test-at" => {
+                let fraction = text.parse().ok().filter(|fraction| (0.0..1.0).contains(fraction));
+                test_at = Some(fraction.ok_or_else(|| format!("--test-at {text}: not a number from 0 to 1"))?);
+            }
+            _ => {
+                let (width, height) = text.split_once('x').unwrap_or((&text, &text));
+                size = UVec2::new(number(width)?, number(height)?);
+            }
+        }
     }
     let folder = folder.unwrap_or_else(|| "dataset".into());
 
     let mut app = testing::app(UVec2::splat(64));
     app.add_systems(Startup, island::spawn);
-    let film = film(cameras as usize, times, size, between);
+    let film = Film { size, ..film(is_grid, cameras as usize, times, test_at) };
     let filmed = testing::film(&mut app, &film, folder.as_ref(), island::place, |done, all| {
         print!("\r{done} of {all} pictures");
         // A line that is not shown is no reason to stop.
@@ -68,21 +80,26 @@ fn main() -> Result {
     Ok(())
 }
 
-/// Returns the film of the island.
-fn film(cameras: usize, times: u32, size: u32, between: bool) -> Film {
-    let mut rig = Rig::hemisphere(island::CENTER, island::DISTANCE, cameras);
+/// Returns the film of the island. A grid has its own number of cameras.
+fn film(is_grid: bool, cameras: usize, times: u32, test_at: Option<f32>) -> Film {
+    // Every how many cameras one is for the test.
+    let (mut rig, test_cameras) = if is_grid {
+        (Rig::grid(island::CENTER, island::DISTANCE, 0.3, Vec2::new(2.6, 1.0), GRID), 11)
+    } else {
+        (Rig::hemisphere(island::CENTER, island::DISTANCE, cameras), 8)
+    };
     let moment = |time: f32| island::SECONDS * time / times.saturating_sub(1).max(1) as f32;
     let mut moments: Vec<f32> = (0..times).map(|time| moment(time as f32)).collect();
-    let mut hold_out = HoldOut { test_cameras: TEST_CAMERAS, ..HoldOut::default() };
-    if between {
-        rig = Rig::fixed(rig.poses().iter().skip(TEST_CAMERAS - 1).step_by(TEST_CAMERAS).copied().collect());
+    let mut hold_out = HoldOut { test_cameras, ..HoldOut::default() };
+    if let Some(fraction) = test_at {
+        rig = Rig::fixed(rig.poses().iter().skip(test_cameras - 1).step_by(test_cameras).copied().collect());
         // The first and the last time stay, so that 0 and 1 in the camera file are the same moments.
-        moments = (1..times).map(|time| moment(time as f32 - 0.5)).chain([0.0, island::SECONDS]).collect();
+        let inside = (1..times).map(|time| moment((time - 1) as f32 + fraction));
+        moments = inside.chain([0.0, island::SECONDS]).collect();
         hold_out = HoldOut::NOTHING;
     }
     Film {
-        size: UVec2::splat(size),
-        stagger: !between,
+        stagger: test_at.is_none() && !is_grid,
         hold_out,
         prepare_camera: |camera: &mut EntityWorldMut<'_>| {
             camera.insert(AmbientLight { color: Color::srgb(0.75, 0.85, 1.0), brightness: 1200.0, ..default() });

@@ -16,7 +16,7 @@ read -ra bake <<<"${BAKE:---gaussians 90000 --train-steps 30000 --target-size 2.
 
 mkdir -p "$folder"
 film "$folder/dataset" "$@"
-film "$folder/between" --between "$@"
+film "$folder/between" --test-at 0.5 "$@"
 gs4d bake "$folder/dataset" -o "$folder/island.gs4d" "${bake[@]}"
 printf '\nCameras that were held out, at their own moments of the film:\n'
 gs4d eval "$folder/island.gs4d" --data "$folder/dataset" --split test

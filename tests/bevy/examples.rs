@@ -203,7 +203,10 @@ fn the_example_film_refuses_wrong_arguments_and_has_help() {
     let used = used.path().to_str().expect("temporary folders have plain names");
     for (arguments, named) in [
         (&["--nonsense"][..], "--nonsense"),
-        (&["--times"], "--times needs a number"),
+        (&["--times"], "--times needs a value"),
+        (&["--size", "8y8"], "--size 8y8"),
+        (&["--rig", "ball"], "hemisphere and grid"),
+        (&["--test-at", "2"], "--test-at 2"),
         (&["--cameras", "many"], "--cameras many"),
         (&["one", "two"], "two: more than one folder"),
         (&["none", "--cameras", "0"], "at least one camera"),
@@ -218,7 +221,7 @@ fn the_example_film_refuses_wrong_arguments_and_has_help() {
     let output = run("film", &["--help"]);
     let said = String::from_utf8_lossy(&output.stdout);
     assert!(output.status.success(), "film --help ends with {}", output.status);
-    for expected in ["--between", "--example film", "island.sh"] {
+    for expected in ["--test-at", "--example film", "island.sh"] {
         assert!(said.contains(expected), "film --help mentions {expected}:\n{said}");
     }
 }

@@ -12,14 +12,23 @@ use bevy::app::App;
 use bevy::asset::Assets;
 use bevy::ecs::observer::On;
 use bevy::image::Image;
+use bevy::render::RenderApp;
 use bevy::render::gpu_readback::{Readback, ReadbackComplete};
-use bevy::render::render_resource::TextureFormat;
+use bevy::render::render_asset::RenderAssets;
+use bevy::render::render_resource::{
+    BufferDescriptor, BufferUsages, CommandEncoderDescriptor, Extent3d, MapMode, PollType, TexelCopyBufferInfo,
+    TexelCopyBufferLayout, TextureFormat,
+};
+use bevy::render::renderer::{RenderDevice, RenderQueue};
+use bevy::render::texture::GpuImage;
 use glam::UVec2;
 use half::f16;
 use image::codecs::png::PngEncoder;
 use image::{Rgba32FImage, RgbaImage};
 use std::io;
+use std::mem;
 use std::path::{Path, PathBuf};
+use std::sync::mpsc::channel;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -60,13 +69,35 @@ pub fn read(app: &mut App, offscreen: &Offscreen) -> Result<RgbaImage, TestingEr
 /// # Errors
 /// Errors of drawing; a picture that was not made by [`Offscreen::hdr`]; a read-back from the GPU that fails.
 pub fn read_hdr(app: &mut App, offscreen: &Offscreen) -> Result<Rgba32FImage, TestingError> {
+    read_half(app, offscreen)?.to_floats().ok_or(TestingError::Readback)
+}
+
+/// A picture in HDR as the GPU has it: RGBA in linear light.
+pub(super) struct HalfPicture {
+    size: UVec2,
+    /// Half floats, row by row.
+    data: Vec<u8>,
+}
+
+impl HalfPicture {
+    /// `data` has eight bytes for each pixel.
+    pub(super) fn new(size: UVec2, data: Vec<u8>) -> Self {
+        Self { size, data }
+    }
+
+    /// Returns the picture in floats, or `None` if values are missing.
+    pub(super) fn to_floats(&self) -> Option<Rgba32FImage> {
+        let values = self.data.as_chunks::<2>().0.iter().map(|value| f16::from_le_bytes(*value).to_f32()).collect();
+        Rgba32FImage::from_raw(self.size.x, self.size.y, values)
+    }
+}
+
+/// Reads a picture as [`read_hdr`] does, and leaves its conversion to the caller.
+pub(super) fn read_half(app: &mut App, offscreen: &Offscreen) -> Result<HalfPicture, TestingError> {
     if !is_hdr(app, offscreen) {
         return Err(TestingError::Format { pixels: "8 bits in each channel", remedy: "read" });
     }
-    let size = offscreen.size;
-    let data = pixels(app, offscreen, 8)?;
-    let values = data.as_chunks::<2>().0.iter().map(|value| f16::from_le_bytes(*value).to_f32()).collect();
-    Rgba32FImage::from_raw(size.x, size.y, values).ok_or(TestingError::Readback)
+    Ok(HalfPicture::new(offscreen.size, pixels(app, offscreen, 8)?))
 }
 
 fn is_hdr(app: &App, offscreen: &Offscreen) -> bool {
@@ -79,15 +110,52 @@ fn is_hdr(app: &App, offscreen: &Offscreen) -> bool {
 fn pixels(app: &mut App, offscreen: &Offscreen, bytes: usize) -> Result<Vec<u8>, TestingError> {
     require_renderer(app)?;
     start(app)?;
+    if let Some(copied) = copied(app, offscreen, bytes) {
+        return copied;
+    }
     let arrived = Arc::new(Mutex::new(None));
     let sink = arrived.clone();
-    let store = move |event: On<ReadbackComplete>| {
-        *sink.lock().unwrap_or_else(PoisonError::into_inner) = Some(event.data.clone());
+    let store = move |mut event: On<ReadbackComplete>| {
+        *sink.lock().unwrap_or_else(PoisonError::into_inner) = Some(mem::take(&mut event.data));
     };
     let readback = app.world_mut().spawn(Readback::texture(offscreen.image.clone())).observe(store).id();
     let data = wait(app, &arrived);
     app.world_mut().despawn(readback);
     Ok(unpadded(&data?, offscreen.size, bytes))
+}
+
+/// Copies the pixels without an update. `None` if rendering is pipelined, or if no update has drawn a picture of this size.
+fn copied(app: &App, offscreen: &Offscreen, bytes: usize) -> Option<Result<Vec<u8>, TestingError>> {
+    let world = app.get_sub_app(RenderApp)?.world();
+    let image = world.get_resource::<RenderAssets<GpuImage>>()?.get(&offscreen.image)?;
+    let size = Extent3d { width: offscreen.size.x, height: offscreen.size.y, depth_or_array_layers: 1 };
+    if image.texture.size() != size {
+        return None;
+    }
+    let (device, queue) = (world.get_resource::<RenderDevice>()?, world.get_resource::<RenderQueue>()?);
+    let row = (offscreen.size.x as usize * bytes).next_multiple_of(256) as u32;
+    let buffer = device.create_buffer(&BufferDescriptor {
+        label: Some("gs4d picture"),
+        size: u64::from(row) * u64::from(offscreen.size.y),
+        usage: BufferUsages::COPY_DST | BufferUsages::MAP_READ,
+        mapped_at_creation: false,
+    });
+    let layout = TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row), rows_per_image: None };
+    let mut encoder = device.create_command_encoder(&CommandEncoderDescriptor::default());
+    let to = TexelCopyBufferInfo { buffer: &buffer, layout };
+    encoder.copy_texture_to_buffer(image.texture.as_image_copy(), to, size);
+    queue.submit([encoder.finish()]);
+    let (sender, mapped) = channel();
+    buffer.slice(..).map_async(MapMode::Read, move |result| {
+        // The receiver is dropped if waiting has failed.
+        let _ = sender.send(result.is_ok());
+    });
+    let waited = device.poll(PollType::wait_indefinitely()).is_ok() && mapped.try_recv() == Ok(true);
+    Some(if waited {
+        Ok(unpadded(&buffer.slice(..).get_mapped_range(), offscreen.size, bytes))
+    } else {
+        Err(TestingError::Readback)
+    })
 }
 
 fn wait(app: &mut App, arrived: &Mutex<Option<Vec<u8>>>) -> Result<Vec<u8>, TestingError> {
@@ -105,7 +173,8 @@ fn wait(app: &mut App, arrived: &Mutex<Option<Vec<u8>>>) -> Result<Vec<u8>, Test
 /// pixel.
 fn unpadded(data: &[u8], size: UVec2, bytes: usize) -> Vec<u8> {
     let row = size.x as usize * bytes;
-    data.chunks(row.next_multiple_of(256)).flat_map(|padded| padded.iter().take(row).copied()).collect()
+    let rows = data.chunks(row.next_multiple_of(256)).map(|padded| &padded[..row.min(padded.len())]);
+    rows.collect::<Vec<_>>().concat()
 }
 
 /// Writes `frames` pictures into `folder` as `0000.png`, `0001.png` and so on, and returns their paths. The first shows the current time,

@@ -23,13 +23,20 @@ pub fn step(app: &mut App, duration: Duration) -> Result<(), TestingError> {
     // No time passes while assets are loaded, also in apps that `testing::app` did not create.
     app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::ZERO));
     load(app)?;
+    if duration.is_zero() { Ok(()) } else { advance_by(app, duration) }
+}
+
+/// Advances the app as [`step`] does, in at least one update, without waiting for assets.
+pub(super) fn advance_by(app: &mut App, duration: Duration) -> Result<(), TestingError> {
     let mut left = duration;
-    while !left.is_zero() {
+    loop {
         let frame = left.min(FRAME);
         advance(app, frame)?;
         left -= frame;
+        if left.is_zero() {
+            return Ok(());
+        }
     }
-    Ok(())
 }
 
 /// Runs one update that advances time by `step`.

@@ -8,9 +8,9 @@ use super::hold_out::Split;
 use super::writer::Writer;
 use crate::codec::CodecError;
 use crate::plugin::testing::TestingError;
+use crate::plugin::testing::readback::HalfPicture;
 use bevy::transform::components::Transform;
 use glam::UVec2;
-use image::Rgba32FImage;
 use serde::Serialize;
 use std::fs;
 use std::io::{self, ErrorKind};
@@ -77,7 +77,7 @@ impl<'a> Files<'a> {
         [camera, time]: [usize; 2],
         seconds: f32,
         pose: &Transform,
-        picture: Rgba32FImage,
+        picture: HalfPicture,
     ) -> Result<(), FilmError> {
         let name = format!("{}/c{camera:04}_t{time:04}", split.name());
         self.writer.add(picture, self.folder.join(format!("{name}.png")))?;

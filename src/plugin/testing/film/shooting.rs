@@ -2,14 +2,20 @@
 //!
 //! In: an app and a [`Film`]. Out: the dataset's files; the app at the last time, with its own cameras as before.
 //!
-//! One camera is moved from pose to pose. It draws in linear light over transparent black, so that a pixel holds its color times its
+//! One camera is moved from pose to pose. Shading takes most of the time, so a picture is drawn twice only where its pose is known: lists of lights,
+//! which Bevy sizes by counts of the frame before, are whole in the second. The camera draws in linear light over transparent black, so that a pixel holds its color times its
 //! coverage. Pictures are encoded and written on other threads while the next ones are drawn.
 
 use super::error::FilmError;
 use super::files::Files;
 use super::hold_out::{HoldOut, Split};
 use super::rig::Rig;
-use crate::plugin::testing::{Offscreen, TestingError, read_hdr, settle, step};
+use crate::plugin::component::GaussianCapture3d;
+use crate::plugin::testing::pipelines::pipelines_are_ready;
+use crate::plugin::testing::readback::read_half;
+use crate::plugin::testing::stepping::advance_by;
+use crate::plugin::testing::waiting::load;
+use crate::plugin::testing::{Offscreen, TestingError, settle};
 use bevy::app::App;
 use bevy::asset::Assets;
 use bevy::camera::{Camera, Camera3d, ClearColorConfig, Hdr, PerspectiveProjection, Projection};
@@ -18,6 +24,8 @@ use bevy::core_pipeline::tonemapping::{DebandDither, Tonemapping};
 use bevy::ecs::entity::Entity;
 use bevy::ecs::world::{EntityWorldMut, World};
 use bevy::image::Image;
+use bevy::render::RenderApp;
+use bevy::render::render_resource::PollType;
 use bevy::render::renderer::RenderDevice;
 use bevy::render::view::Msaa;
 use bevy::transform::components::Transform;
@@ -82,10 +90,10 @@ pub struct Filmed {
 
 /// Films the scene of an app into `folder`, as a dataset in the Blender form for `gs4d train --data FOLDER`.
 ///
-/// For each time in increasing order, the app advances to it as by [`step`], `set_time` receives the world and the time in seconds, and every
+/// For each time in increasing order, the app advances to it as by [`step`](crate::testing::step), `set_time` receives the world and the time in seconds, and every
 /// camera of the rig draws while no time passes; with [staggered](Film::stagger) shutters, the app advances to the moment of each camera. A
-/// scene that the app's own time moves, such as a simulation, needs nothing in `set_time`: `|_, _| {}`. At least four updates draw each
-/// picture. The app's own cameras are inactive meanwhile. `progress` receives the number of pictures drawn and the number of all.
+/// scene that the app's own time moves, such as a simulation, needs nothing in `set_time`: `|_, _| {}`. Two updates draw each picture, the
+/// first of each pose, those of scenes with captures and those of apps with pipelined rendering more. The app's own cameras are inactive meanwhile. `progress` receives the number of pictures drawn and the number of all.
 ///
 /// The pictures are 8-bit RGBA with straight alpha, which is the coverage: 1 on opaque meshes, 0 where nothing is drawn. Times become 0 to 1
 /// in the camera files, from the first time to the last; the entry `seconds` has the seconds.
@@ -217,21 +225,48 @@ fn shoot(
     for index in 0..times.len() {
         for (moment, place) in moments(film, times, index) {
             let seconds = moment.as_secs_f32();
-            if !is_set || moment > now {
-                step(app, moment - now)?;
-                set_time(app.world_mut(), seconds);
-                (now, is_set) = (moment, true);
-            }
             // Cameras have no scale.
             let pose = Transform { scale: Vec3::ONE, ..film.rig.poses[place] };
             app.world_mut().entity_mut(camera).insert(pose);
-            settle(app)?;
-            let picture = read_hdr(app, offscreen)?;
+            advance_by(app, moment - now)?;
+            if !is_set || moment > now {
+                set_time(app.world_mut(), seconds);
+                (now, is_set) = (moment, true);
+            }
+            wait_for_gpu(app)?;
+            // Lists of lights grow over some updates when a pose first sees them.
+            if index == 0 || film.rig.is_path {
+                settle(app)?;
+            }
+            draw(app)?;
+            let picture = read_half(app, offscreen)?;
             let split = film.hold_out.split(place, index, times.len());
             files.add(split, [place, index], seconds, &pose, picture)?;
             done += 1;
             progress(done, all);
         }
+    }
+    Ok(())
+}
+
+/// Waits until the GPU has finished the last update, and what it has counted for the next one has arrived.
+fn wait_for_gpu(app: &App) -> Result<(), TestingError> {
+    let device = app.world().get_resource::<RenderDevice>().ok_or(TestingError::NoRenderer)?;
+    device.poll(PollType::wait_indefinitely()).map(drop).map_err(|_| TestingError::Readback)
+}
+
+/// Runs the app until it has drawn a complete picture.
+fn draw(app: &mut App) -> Result<(), TestingError> {
+    // Otherwise rendering is pipelined: the picture of an update is drawn during the next.
+    let draws_at_once = app.get_sub_app(RenderApp).is_some();
+    if !draws_at_once || app.world_mut().query::<&GaussianCapture3d>().iter(app.world()).next().is_some() {
+        return settle(app);
+    }
+    let mut is_complete = false;
+    while !is_complete {
+        // An update in which pipelines are compiled may leave out what they draw.
+        is_complete = pipelines_are_ready(app)?;
+        load(app)?;
     }
     Ok(())
 }

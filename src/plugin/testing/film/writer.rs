@@ -2,6 +2,7 @@
 //!
 //! In: pictures in linear light with their coverage, and paths. Out: PNG files with sRGB-encoded colors and straight alpha.
 
+use crate::plugin::testing::readback::HalfPicture;
 use crate::plugin::testing::{TestingError, save};
 use crate::view::srgb;
 use glam::Vec3;
@@ -12,7 +13,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 
 /// A picture and its path.
-type Picture = (Rgba32FImage, PathBuf);
+type Picture = (HalfPicture, PathBuf);
 
 /// Threads that encode and write pictures. As many pictures as there are threads may wait.
 pub(super) struct Writer {
@@ -38,7 +39,7 @@ impl Writer {
     ///
     /// # Errors
     /// The first picture that could not be written.
-    pub(super) fn add(&self, picture: Rgba32FImage, path: PathBuf) -> Result<(), TestingError> {
+    pub(super) fn add(&self, picture: HalfPicture, path: PathBuf) -> Result<(), TestingError> {
         if let Some(pictures) = &self.pictures {
             // The threads take pictures until the writer is dropped, also after a failure.
             let _ = pictures.send((picture, path));
@@ -79,7 +80,8 @@ fn write_all(waiting: &Mutex<Receiver<Picture>>, failed: &Mutex<Option<TestingEr
     loop {
         let next = waiting.lock().unwrap_or_else(PoisonError::into_inner).recv();
         let Ok((picture, path)) = next else { return };
-        if let Err(error) = save(&straight(&picture), &path) {
+        let floats = picture.to_floats().ok_or(TestingError::Readback);
+        if let Err(error) = floats.and_then(|floats| save(&straight(&floats), &path)) {
             failed.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
         }
     }
@@ -102,6 +104,8 @@ fn straight(picture: &Rgba32FImage) -> RgbaImage {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::UVec2;
+    use half::f16;
 
     #[test]
     fn colors_are_divided_by_their_coverage_in_linear_light() {
@@ -118,7 +122,8 @@ mod tests {
     fn the_first_picture_that_cannot_be_written_is_an_error() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let (whole, inside) = (folder.path().join("a.png"), folder.path().join("a.png/b.png"));
-        let picture = || Rgba32FImage::from_pixel(2, 2, Rgba([0.5, 0.5, 0.5, 1.0]));
+        let half = f16::from_f32(0.5).to_le_bytes();
+        let picture = || HalfPicture::new(UVec2::splat(2), half.repeat(16));
         let writer = Writer::begin();
         writer.add(picture(), whole.clone()).expect("the folder can be written to");
         writer.finish().expect("every picture is written");
