@@ -18,6 +18,7 @@ mod gradients;
 mod grow;
 #[cfg(feature = "offline")]
 mod identical_views;
+mod import_motion;
 mod import_pictures;
 #[cfg(feature = "offline")]
 mod loading;
