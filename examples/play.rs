@@ -17,6 +17,8 @@
 mod common;
 #[path = "common/controls.rs"]
 mod controls;
+#[path = "play/drop.rs"]
+mod drop;
 
 use bevy::asset::UnapprovedPathMode;
 use bevy::core_pipeline::tonemapping::Tonemapping;
@@ -26,7 +28,6 @@ use bevy::window::PrimaryWindow;
 use bevy_egui::input::{egui_wants_any_keyboard_input, egui_wants_any_pointer_input};
 use bevy_gs4d::Upright;
 use bevy_gs4d::asset::GaussianCapture;
-use bevy_gs4d::codec::ReadOptions;
 use bevy_gs4d::inspector::{Inspector, InspectorPlugin};
 use bevy_gs4d::picker::CapturePicker;
 use bevy_gs4d::playback::Playback;
@@ -34,7 +35,8 @@ use bevy_gs4d::testing::{self, Offscreen};
 use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin};
 use common::Orbit;
 use controls::{follow, mouse};
-use std::path::{Path, PathBuf};
+use drop::drop_file;
+use std::path::PathBuf;
 use std::time::Duration;
 
 #[derive(Resource)]
@@ -176,33 +178,4 @@ fn pick(
     *visibility = Visibility::Visible;
     *place = Transform::from_translation(hit.point).with_scale(Vec3::splat(hit.distance * 0.008));
     inspector.note = format!("Gaussian {}, {:.2} away", hit.gaussian, hit.distance);
-}
-
-/// Loads a file, or the capture in a folder: its `meta.json`, or its numbered files as a sequence.
-fn load(assets: &AssetServer, path: &Path) -> Handle<GaussianCapture> {
-    if !path.is_dir() {
-        return assets.load(path.to_owned());
-    }
-    let files = path.read_dir().into_iter().flatten().flatten().map(|entry| entry.path());
-    let first = files.filter(|file| file.extension().is_some_and(|extension| extension == "ply")).min();
-    match first {
-        Some(first) => {
-            assets.load_builder().with_settings(|options: &mut ReadOptions| options.sequence = true).load(first)
-        }
-        None => assets.load(path.join("meta.json")),
-    }
-}
-
-fn drop_file(
-    mut drops: MessageReader<FileDragAndDrop>,
-    assets: Res<AssetServer>,
-    mut capture: Single<(&mut GaussianCapture3d, &mut Playback)>,
-) {
-    for drop in drops.read() {
-        if let FileDragAndDrop::DroppedFile { path_buf, .. } = drop {
-            let (shown, playback) = &mut *capture;
-            shown.0 = load(&assets, path_buf);
-            **playback = Playback::default();
-        }
-    }
 }

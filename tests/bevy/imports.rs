@@ -1,19 +1,26 @@
 //! Captures of other makes as assets in Bevy apps.
 //!
 //! In: files of every format that is exported, and files of other makes. Out: proof that `assets.load` shows what `codec::load` reads, with the
-//! settings given; that other files of a folder are found; that failures have a message. Needs neither a GPU nor a window.
+//! settings given; that other files of a folder are found; that failures have a message; that the example `play` shows what is dropped on its
+//! window. Needs neither a GPU nor a window.
+
+#[path = "../../examples/play/drop.rs"]
+mod drop;
 
 use crate::support::data::data;
 use crate::support::waiting::wait_until;
+use bevy::asset::UnapprovedPathMode;
 use bevy::prelude::*;
+use bevy::window::FileDragAndDrop;
 use bevy_gs4d::asset::{CaptureState, GaussianCapture};
 use bevy_gs4d::codec::{self, ReadOptions};
 use bevy_gs4d::internal::codec::export::{EXPORTS, Export, Exporter};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{FilterKind, RuntimeScene, UpAxis};
 use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin};
+use drop::drop_file;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Returns an app whose assets are in `folder`.
 fn app(folder: &Path) -> App {
@@ -124,5 +131,51 @@ fn a_file_that_is_no_capture_fails_with_the_reason() {
         let (_, state) = loaded(&mut app, name, &ReadOptions::default());
         let CaptureState::Failed(message) = state else { panic!("{name} is no capture") };
         assert!(message.contains(name) && message.contains(part), "the message says why: {message}");
+    }
+}
+
+/// Files of other makes with a layout of their own, in the folder that `GS4D_DATA` names.
+const OF_OTHER_MAKES: [&str; 9] = [
+    "formats/playcanvas/biker.compressed.ply",
+    "formats/playcanvas/playbot/6_0",
+    "formats/splat-transform/minimal-v3.spz",
+    "formats/splat-transform/cloud_sh3.glb",
+    "formats/sogst/arc_d2_sh0_mono.ply",
+    "formats/sog4d/swarm.ply",
+    "formats/sog4d/swarm_q16.sog4d",
+    "formats/tsog/made_here_discrete5.tsog",
+    "splatv/coffeeshort2.splatv",
+];
+
+#[test]
+fn captures_of_every_format_are_shown_when_they_are_dropped_on_the_window() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let frames = folder.path().join("frames");
+    fs::create_dir(&frames).expect("the folder can be written to");
+    export(&frames, "ply", &[0.2, 0.8]);
+    let exported = EXPORTS.iter().filter(|format| !format.id.starts_with("usd") && format.id != "4dgs");
+    let exported = exported.map(|format| folder.path().join(export(folder.path(), format.id, &[0.4]).remove(0)));
+    let mut files: Vec<PathBuf> = exported.chain([frames]).collect();
+    files.extend(data().into_iter().flat_map(|data| OF_OTHER_MAKES.map(|name| data.join(name))));
+
+    let mut app = App::new();
+    let assets = AssetPlugin { unapproved_path_mode: UnapprovedPathMode::Allow, ..default() };
+    app.add_plugins((MinimalPlugins, assets, GaussianCapturePlugin)).add_message::<FileDragAndDrop>();
+    app.add_systems(Update, drop_file);
+    let player = app.world_mut().spawn(GaussianCapture3d(Handle::default())).id();
+    for path in files {
+        let file = path.display().to_string();
+        let window = Entity::PLACEHOLDER;
+        app.world_mut().write_message(FileDragAndDrop::DroppedFile { window, path_buf: path });
+        app.update();
+        let dropped = app.world().get::<GaussianCapture3d>(player).expect("the player").0.clone();
+        let state = |app: &App| app.world().get::<CaptureState>(player).expect("every capture has a state").clone();
+        let is_known = |app: &App| {
+            let is_loaded = app.world().resource::<Assets<GaussianCapture>>().contains(&dropped);
+            is_loaded && state(app) == CaptureState::Ready || matches!(state(app), CaptureState::Failed(_))
+        };
+        wait_until(&mut app, &file, is_known, App::update);
+        assert_eq!(state(&app), CaptureState::Ready, "{file} is shown");
+        assert!(!scene(&app, &dropped).is_empty(), "{file}: it has Gaussians");
     }
 }
