@@ -36,6 +36,7 @@ mod loops;
 mod passes;
 mod record;
 mod scratch;
+mod stamps;
 mod state;
 mod variant;
 

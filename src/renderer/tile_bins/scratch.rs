@@ -4,7 +4,7 @@
 //! In: the room that each view needs. Out: a [`Claim`] for each view: buffers with room for any of the views, which exist as long as a view
 //! uses them.
 
-use super::bins::stamp_round;
+use super::stamps::stamp_round;
 use crate::renderer::layout::{SplatShape, VisibleSplat};
 use crate::renderer::memory::Allocator;
 use crate::renderer::view::Sizes;

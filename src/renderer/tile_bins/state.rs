@@ -3,7 +3,8 @@
 //! In: the size of the picture, counts of earlier frames. Out: [`BinState`]: the size of the bins, their wanted capacity, whose counters are in
 //! use.
 
-use super::bins::{bin_grid, stamp};
+use super::bins::bin_grid;
+use super::stamps::stamp;
 use super::variant::BinVariant;
 use crate::renderer::layout::Counters;
 use crate::renderer::view::Sizes;
