@@ -442,7 +442,8 @@ fn frames_that_exceed_the_capacity_of_pairs_are_complete() {
         // The first frame counts, the second starts the read-back of the counts, the third has them.
         for frame in 0..3 {
             draw_frame(headless.context(), &renderer, &mut view, &instances, BACKGROUND);
-            let bytes = view.statistics().bytes;
+            let statistics = view.statistics();
+            let bytes = statistics.bytes + statistics.shared_bytes;
             let room = *first_bytes.get_or_insert(bytes);
             // Four bytes for each pair in tile bins, more in the global sort.
             let needed = u64::from(expected.counts.pairs - FIRST_CAPACITY) * 4;
