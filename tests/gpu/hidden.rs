@@ -30,6 +30,20 @@ const SURFACE: f32 = 1.0;
 const BEHIND: f32 = 2.0;
 const IN_FRONT: f32 = 0.5;
 
+/// Returns the pipeline of a pass, with bind group layouts of the bindings that it uses.
+fn pipeline(device: &wgpu::Device, pass: &str, definitions: &[&str]) -> wgpu::ComputePipeline {
+    let source = wgpu::ShaderSource::Naga(Cow::Owned(compose(pass, definitions).expect("it composes")));
+    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: None, source });
+    device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        label: None,
+        layout: None,
+        module: &module,
+        entry_point: Some(pass),
+        compilation_options: wgpu::PipelineCompilationOptions::default(),
+        cache: None,
+    })
+}
+
 /// Returns the depth of the farthest surface of each tile, by `find_surfaces`. `size` is that of the picture, its tiles, and the samples of the surface.
 fn find_surfaces(
     context: &GpuContext,
@@ -38,16 +52,7 @@ fn find_surfaces(
     (size, tiles, samples): (UVec2, UVec2, u32),
 ) -> Vec<f32> {
     let GpuContext { device, queue, .. } = context;
-    let source = wgpu::ShaderSource::Naga(Cow::Owned(compose("find_surfaces", definitions).expect("it composes")));
-    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: None, source });
-    let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-        label: None,
-        layout: None,
-        module: &module,
-        entry_point: Some("find_surfaces"),
-        compilation_options: wgpu::PipelineCompilationOptions::default(),
-        cache: None,
-    });
+    let pipeline = pipeline(device, "find_surfaces", definitions);
     let frame = FrameUniforms {
         size: size.to_array(),
         tiles: tiles.to_array(),
@@ -93,16 +98,7 @@ fn find_surfaces(
 /// Blends a list whose first batch is behind the surface and whose other splats are in front of it. Returns the red of each pixel.
 fn blend(context: &GpuContext, definitions: &[&str], surface: &wgpu::TextureView, samples: u32) -> Vec<f32> {
     let GpuContext { device, queue, .. } = context;
-    let source = wgpu::ShaderSource::Naga(Cow::Owned(compose("blend_blocks", definitions).expect("it composes")));
-    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: None, source });
-    let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-        label: None,
-        layout: None,
-        module: &module,
-        entry_point: Some("blend_blocks"),
-        compilation_options: wgpu::PipelineCompilationOptions::default(),
-        cache: None,
-    });
+    let pipeline = pipeline(device, "blend_blocks", definitions);
     let buffer = |contents: &[u8], usage| {
         device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: None, contents, usage })
     };
