@@ -8,7 +8,7 @@
 //! (9), a word in the names of the scenes to measure (all scenes). Out: for each scene milliseconds of a frame (median of the rounds), the
 //! spread of the rounds, the additional time compared with the scene that the last column names (median of the rounds' differences), and the
 //! range of the middle half of these differences; then, from the same number of further frames but at most 100, the GPU time of the captures'
-//! passes, the number of splats, and the GPU memory of all views. Default plugins, no window, pipelined rendering; all apps take turns, and each measurement ends when the
+//! passes, all together and (on a line of its own) each, the number of splats, and the GPU memory of all views. Default plugins, no window, pipelined rendering; all apps take turns, and each measurement ends when the
 //! GPU has finished.
 
 mod common;
@@ -90,35 +90,65 @@ fn main() -> Result {
         known.push((name, times));
         let than = known.iter().find(|(name, _)| *name == compared);
         let (more, middle) = than.map_or((f64::NAN, String::new()), |(_, than)| times.more_than(than));
-        let (gpu, splats, bytes) = passes(app, arguments.frames.clamp(1, 100))?;
+        let Passes { whole: gpu, each, splats, bytes } = passes(app, arguments.frames.clamp(1, 100))?;
         println!(
             "{name:<36} {:>9.3} {:>15} {more:>9.3} {middle:>15} {gpu:>9.4} {splats:>9} {:>8.1}  {compared}",
             times.median(),
             times.spread(),
             bytes as f64 / 1e6
         );
+        let each: Vec<_> = each.iter().map(|(name, time)| format!("{name} {time:.4}")).collect();
+        println!("{:<36} {}", "", each.join(", "));
     }
     Ok(())
 }
 
-/// Returns the GPU time of all passes for captures in a frame, in milliseconds (median of `frames` frames), the number of splats, and the bytes
-/// of all views.
-fn passes(app: &mut App, frames: u32) -> Result<(f64, u32, u64)> {
+/// What the captures of a frame take.
+struct Passes {
+    /// GPU time of all passes in a frame, milliseconds: the median.
+    whole: f64,
+    /// That of each pass, of all views together.
+    each: Vec<(&'static str, f64)>,
+    splats: u32,
+    /// Bytes of all views.
+    bytes: u64,
+}
+
+/// Measures so many frames.
+fn passes(app: &mut App, frames: u32) -> Result<Passes> {
     let statistics = app.world().resource::<CaptureStatistics>().clone();
     statistics.measure(true);
     common::warm_up(app)?;
     let (mut times, mut splats, mut bytes) = (Vec::new(), 0, 0);
+    let mut each: Vec<(&'static str, Vec<f64>)> = Vec::new();
     for _ in 0..frames {
         common::run(app, 1)?;
         let views = statistics.views();
-        times.push(views.iter().flat_map(|(_, view)| &view.passes).map(|pass| pass.milliseconds).sum::<f64>());
+        let mut frame: Vec<(&'static str, f64)> = Vec::new();
+        for pass in views.iter().flat_map(|(_, view)| &view.passes) {
+            match frame.iter_mut().find(|(name, _)| *name == pass.name) {
+                Some((_, time)) => *time += pass.milliseconds,
+                None => frame.push((pass.name, pass.milliseconds)),
+            }
+        }
+        times.push(frame.iter().map(|(_, time)| time).sum::<f64>());
+        for (name, time) in frame {
+            match each.iter_mut().find(|(known, _)| *known == name) {
+                Some((_, times)) => times.push(time),
+                None => each.push((name, vec![time])),
+            }
+        }
         splats = views.iter().map(|(_, view)| view.visible).sum();
         let shared = views.iter().map(|(_, view)| view.shared_bytes).max().unwrap_or(0);
         bytes = shared + views.iter().map(|(_, view)| view.bytes).sum::<u64>();
     }
     statistics.measure(false);
-    times.sort_by(f64::total_cmp);
-    Ok((times[times.len() / 2], splats, bytes))
+    let median = |mut times: Vec<f64>| {
+        times.sort_by(f64::total_cmp);
+        times.get(times.len() / 2).copied().unwrap_or(f64::NAN)
+    };
+    let each = each.into_iter().map(|(name, times)| (name, median(times))).collect();
+    Ok(Passes { whole: median(times), each, splats, bytes })
 }
 
 /// Returns an app with a camera and a scene. All assets are loaded.

@@ -67,7 +67,8 @@ struct InstanceUniforms {
     trained_variance: vec2<f32>,
     // The marginal at and below which a Gaussian is not drawn.
     marginal_cutoff: f32,
-    padding: f32,
+    // No Gaussian of the instance is nearer to the camera, camera units.
+    nearest: f32,
     // Rows of capture-to-crop-box; the box is from -1 to 1.
     crop_x: vec4<f32>,
     crop_y: vec4<f32>,
@@ -202,6 +203,7 @@ const SORT_SLOTS: u32 = 0u;
 const SORT_VISIBLE: u32 = 1u;
 const SORT_PAIRS: u32 = 2u;
 
-// Number of counters of tile bins before the counters of parts and bins: pairs of this frame, modulo 2^32, and how often this number
-// has wrapped; then visible splats, pairs, splats of the fullest bin and pairs for which room was asked of the previous frame.
-const BIN_COUNTERS: u32 = 6u;
+// Number of counters of tile bins before the counters of parts and bins: pairs of this frame, modulo 2^32, how often this number
+// has wrapped, and the depth order of the farthest surface; then visible splats, pairs, splats of the fullest bin and pairs for which room was
+// asked of the previous frame.
+const BIN_COUNTERS: u32 = 7u;

@@ -1,6 +1,6 @@
 // find_surfaces: finds the farthest opaque surface of each tile, one workgroup per tile; before `project_bin`, in frames behind surfaces.
 // In: the depth of opaque surfaces. Out: the depth order of the farthest surface of each tile, by which `project_bin` leaves out splats that
-// no pixel of their tiles shows.
+// no pixel of their tiles shows, and of the picture, by which it leaves out whole instances.
 #import gs4d::bins::depth_order
 #ifdef MULTISAMPLED
 #import gs4d::pixel::{frame, surface_range}
@@ -13,6 +13,8 @@ const THREADS: u32 = 64u;
 const PIXELS: u32 = 256u;
 
 @group(1) @binding(0) var<storage, read_write> tile_surfaces: array<u32>;
+// Counters (see BIN_COUNTERS). The farthest surface of the picture was cleared by `sort_bins` of the previous frame.
+@group(1) @binding(1) var<storage, read_write> bins: array<atomic<u32>>;
 
 var<workgroup> farthest: atomic<u32>;
 
@@ -36,6 +38,8 @@ fn find_surfaces(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocat
     atomicMax(&farthest, own);
     workgroupBarrier();
     if thread == 0u {
-        tile_surfaces[tile_index(group.xy, frame.tiles.x)] = atomicLoad(&farthest);
+        let of_tile = atomicLoad(&farthest);
+        tile_surfaces[tile_index(group.xy, frame.tiles.x)] = of_tile;
+        atomicMax(&bins[2], of_tile);
     }
 }

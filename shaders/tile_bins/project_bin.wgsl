@@ -36,6 +36,9 @@ var<workgroup> own_pairs: atomic<u32>;
 var<workgroup> visible_before: u32;
 
 #ifdef OPAQUE
+// 1: the whole instance is behind the surfaces of all pixels.
+var<workgroup> all_hidden: u32;
+
 // Returns whether a splat is behind the surfaces of all pixels of its tiles: `blend_blocks` would show it nowhere.
 fn is_hidden(tiles: vec4<u32>, key: u32) -> bool {
     let size = tiles.zw - tiles.xy;
@@ -64,10 +67,18 @@ fn project_bin(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocatio
         atomicStore(&present_count, 0u);
         // `sort_bins` of the next frame counts from 0.
         if group.x == 0u {
-            atomicStore(&bins[4], 0u);
             atomicStore(&bins[5], 0u);
+            atomicStore(&bins[6], 0u);
         }
+#ifdef OPAQUE
+        all_hidden = select(0u, 1u, depth_order(instance.nearest) > atomicLoad(&bins[2]));
+#endif
     }
+#ifdef OPAQUE
+    if workgroupUniformLoad(&all_hidden) != 0u {
+        return;
+    }
+#endif
     for (var i = thread; i < 128u * instance.per_thread; i += 256u) {
         atomicStore(&present[i], 0u);
     }

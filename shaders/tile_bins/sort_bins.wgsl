@@ -408,7 +408,7 @@ fn reserve_pairs(count: u32) -> u32 {
     if bins[1] > 0u {
         return NONE.x;
     }
-    let first = atomicAdd(&next_bins[5], count);
+    let first = atomicAdd(&next_bins[6], count);
     let fits = count <= frame.pair_capacity && first <= frame.pair_capacity - count;
     return select(NONE.x, first, fits);
 }
@@ -641,18 +641,19 @@ fn sort_bins(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
     let bin = group.y * grid.x + group.x;
     let binned = bins[first_bin + bin];
     if thread == 0u {
-        atomicMax(&next_bins[4], binned);
+        atomicMax(&next_bins[5], binned);
         atomicStore(&next_bins[first_bin + bin], 0u);
         if bin == 0u {
             atomicStore(&next_bins[0], 0u);
             atomicStore(&next_bins[1], 0u);
+            atomicStore(&next_bins[2], 0u);
             var visible = 0u;
             for (var part = 0u; part < frame.binning.w; part++) {
                 visible += bins[BIN_COUNTERS + part];
                 atomicStore(&next_bins[BIN_COUNTERS + part], 0u);
             }
-            atomicStore(&next_bins[2], visible);
-            atomicStore(&next_bins[3], select(bins[0], 0xffffffffu, bins[1] > 0u));
+            atomicStore(&next_bins[3], visible);
+            atomicStore(&next_bins[4], select(bins[0], 0xffffffffu, bins[1] > 0u));
         }
     }
 #ifdef COUNTED

@@ -103,8 +103,8 @@ pub struct InstanceUniforms {
     pub trained_variance: [f32; 2],
     /// The marginal at and below which a Gaussian is not drawn.
     pub marginal_cutoff: f32,
-    /// Unused.
-    pub padding: f32,
+    /// No Gaussian of the instance is nearer to the camera, camera units.
+    pub nearest: f32,
     /// Rows of capture-to-crop-box: x.
     pub crop_x: [f32; 4],
     /// Row y.
@@ -368,6 +368,6 @@ pub const SORT_VISIBLE: u32 = 1;
 /// Sorts the pairs.
 pub const SORT_PAIRS: u32 = 2;
 
-/// Number of counters of tile bins before the counters of parts and bins: pairs of this frame, modulo 2³², and how often this number
-/// has wrapped; then the [`Counters`] of the previous frame, the last of which is the number of pairs for which room was asked.
-pub const BIN_COUNTERS: u32 = 6;
+/// Number of counters of tile bins before the counters of parts and bins: pairs of this frame, modulo 2³², how often this number
+/// has wrapped, and the depth order of the farthest surface; then the [`Counters`] of the previous frame, the last of which is the number of pairs for which room was asked.
+pub const BIN_COUNTERS: u32 = 7;

@@ -8,7 +8,7 @@
 use crate::support::composed::compose;
 use crate::support::gpu;
 use crate::support::surfaces::{depth_texture, edge};
-use bevy_gs4d::internal::renderer::layout::{FrameUniforms, SplatShape, VisibleSplat};
+use bevy_gs4d::internal::renderer::layout::{BIN_COUNTERS, FrameUniforms, SplatShape, VisibleSplat};
 use bevy_gs4d::internal::renderer::shaders::MULTISAMPLED;
 use bevy_gs4d::internal::renderer::tile_bins::{Blending, EIGHT_AT_ONCE, LARGE_BATCHES};
 use bevy_gs4d::renderer::{Design, GpuContext, Instance, OpaqueDepth, ViewParameters};
@@ -44,13 +44,13 @@ fn pipeline(device: &wgpu::Device, pass: &str, definitions: &[&str]) -> wgpu::Co
     })
 }
 
-/// Returns the depth of the farthest surface of each tile, by `find_surfaces`. `size` is that of the picture, its tiles, and the samples of the surface.
+/// Returns the depth of the farthest surface of each tile and of the picture, by `find_surfaces`. `size` is that of the picture, its tiles, and the samples of the surface.
 fn find_surfaces(
     context: &GpuContext,
     definitions: &[&str],
     surface: &wgpu::TextureView,
     (size, tiles, samples): (UVec2, UVec2, u32),
-) -> Vec<f32> {
+) -> (Vec<f32>, f32) {
     let GpuContext { device, queue, .. } = context;
     let pipeline = pipeline(device, "find_surfaces", definitions);
     let frame = FrameUniforms {
@@ -65,19 +65,22 @@ fn find_surfaces(
         contents: bytemuck::bytes_of(&frame),
         usage: wgpu::BufferUsages::UNIFORM,
     });
-    let buffer = |usage| {
-        let size = u64::from(4 * tiles.element_product());
+    let surfaces = u64::from(4 * tiles.element_product());
+    let counters = u64::from(4 * BIN_COUNTERS);
+    let buffer = |size, usage| {
         device.create_buffer(&wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false })
     };
-    let written = buffer(wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC);
-    let copy = buffer(wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST);
+    let [written, counted] =
+        [surfaces, counters].map(|size| buffer(size, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC));
+    let copy = buffer(surfaces + counters, wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST);
     let group = |index, entries: &[wgpu::BindGroupEntry<'_>]| {
         let layout = &pipeline.get_bind_group_layout(index);
         device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries })
     };
     let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
     let pixels = [entry(0, frame.as_entire_binding()), entry(2, wgpu::BindingResource::TextureView(surface))];
-    let groups = [group(0, &pixels), group(1, &[entry(0, written.as_entire_binding())])];
+    let written_to = [entry(0, written.as_entire_binding()), entry(1, counted.as_entire_binding())];
+    let groups = [group(0, &pixels), group(1, &written_to)];
     let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
     {
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
@@ -86,13 +89,16 @@ fn find_surfaces(
         pass.set_bind_group(1, &groups[1], &[]);
         pass.dispatch_workgroups(tiles.x, tiles.y, 1);
     }
-    encoder.copy_buffer_to_buffer(&written, 0, &copy, 0, copy.size());
+    encoder.copy_buffer_to_buffer(&written, 0, &copy, 0, surfaces);
+    encoder.copy_buffer_to_buffer(&counted, 0, &copy, surfaces, counters);
     queue.submit([encoder.finish()]);
     copy.slice(..).map_async(wgpu::MapMode::Read, |mapped| mapped.expect("the copy can be mapped"));
     device.poll(wgpu::PollType::wait_indefinitely()).expect("the device finishes");
     let orders: Vec<u32> = bytemuck::pod_collect_to_vec(&copy.slice(..).get_mapped_range());
     // The inverse of `depth_order` for positive depths.
-    orders.into_iter().map(|order| f32::from_bits(order ^ 0x8000_0000)).collect()
+    let depth = |order: u32| f32::from_bits(order ^ 0x8000_0000);
+    let (of_tiles, counters) = orders.split_at(tiles.element_product() as usize);
+    (of_tiles.iter().copied().map(depth).collect(), depth(counters[2]))
 }
 
 /// Blends a list whose first batch is behind the surface and whose other splats are in front of it. Returns the red of each pixel.
@@ -198,15 +204,18 @@ fn find_surfaces_finds_the_farthest_surface_of_each_tile() {
     let is_at = |found: f32, depth: f32| (found / depth - 1.0).abs() < 1e-5;
     const FAR: f32 = 3.4e38;
     let whole = depth_texture(context, size, NEAR / SURFACE);
-    let found = find_surfaces(context, &[], &whole, (size, tiles, 1));
+    let (found, farthest) = find_surfaces(context, &[], &whole, (size, tiles, 1));
+    assert!(is_at(farthest, SURFACE), "the farthest of the picture: {farthest}");
     assert_eq!(found.len(), 15, "a depth for each tile");
     let is_wall = found.iter().all(|&found| is_at(found, SURFACE));
     assert!(is_wall, "a wall before everything; pixels outside the picture do not count: {found:?}");
-    let found = find_surfaces(context, &[], &whole, (size, tiles, 0));
+    let (found, farthest) = find_surfaces(context, &[], &whole, (size, tiles, 0));
+    assert!(is_at(farthest, FAR), "no surfaces: {farthest}");
     assert!(found.iter().all(|&found| is_at(found, FAR)), "no surfaces: {found:?}");
     let (samples, column) = edge(context, size, NEAR, SURFACE, 0.0);
     let samples = samples.create_view(&wgpu::TextureViewDescriptor::default());
-    let found = find_surfaces(context, MULTISAMPLED, &samples, (size, tiles, 4));
+    let (found, farthest) = find_surfaces(context, MULTISAMPLED, &samples, (size, tiles, 4));
+    assert!(is_at(farthest, FAR), "half of the picture has no surface: {farthest}");
     for (tile, found) in found.into_iter().enumerate() {
         let end = 16 * (tile as u32 % tiles.x + 1);
         let expected = if end <= column { SURFACE } else { FAR };

@@ -4,6 +4,7 @@
 //! view and of all views together. As in the original, renders are clamped and not rounded.
 
 use glam::{UVec2, Vec3};
+use rayon::prelude::*;
 use serde::Serialize;
 
 use super::{MAX_PSNR, SizeMismatch, SquaredError, flip, ms_ssim, ssim};
@@ -196,8 +197,19 @@ impl EvaluationSettings {
     }
 }
 
+/// Bytes of the images and the renders of the views that are compared at once.
+const AT_ONCE: usize = 1 << 29;
+
+/// Returns the number of views that are compared at once: one for each thread, as far as their pictures are small.
+fn views_at_once(views: &[TrainingView]) -> usize {
+    let pixels = views.iter().map(|view| view.camera.size.as_u64vec2().element_product()).max().unwrap_or(1);
+    // The image, the image over the background, the render as it is and clamped.
+    let fitting = AT_ONCE as u64 / (4 * size_of::<Vec3>() as u64 * pixels.max(1));
+    rayon::current_num_threads().min(fitting as usize).max(1)
+}
+
 /// Compares every view with its image. `draw` renders a view; `seen` is called with the metrics of each view, its image
-/// and its render (not clamped).
+/// and its render (not clamped), in the order of the views. Images are read and compared on all threads.
 ///
 /// # Errors
 /// An image that is missing or cannot be read, a render of another size, no views, and errors of `draw` and `seen`.
@@ -212,15 +224,23 @@ where
 {
     let mut all = Vec::with_capacity(views.len());
     let mut has_gaps = false;
-    for view in views {
-        let image = view.load_covered()?;
-        has_gaps |= image.has_gaps;
-        let reference = image.over(Vec3::from(settings.background));
-        let render = draw(&view.camera.view(view.time, settings.raster_fov))?;
-        let metrics = ImageMetrics::of(&reference, &render.clamped(), settings.metrics)?;
-        let measured = ViewMetrics { name: view.name.clone(), time: view.time, metrics };
-        seen(&measured, &reference, &render)?;
-        all.push(measured);
+    for some in views.chunks(views_at_once(views)) {
+        let images: Vec<_> = some.par_iter().map(TrainingView::load_covered).collect();
+        let mut pairs = Vec::with_capacity(some.len());
+        for (view, image) in some.iter().zip(images) {
+            let image = image?;
+            has_gaps |= image.has_gaps;
+            let render = draw(&view.camera.view(view.time, settings.raster_fov))?;
+            pairs.push((image.over(Vec3::from(settings.background)), render));
+        }
+        let compare =
+            |(reference, render): &(Picture, Picture)| ImageMetrics::of(reference, &render.clamped(), settings.metrics);
+        let compared: Vec<_> = pairs.par_iter().map(compare).collect();
+        for ((view, (reference, render)), metrics) in some.iter().zip(&pairs).zip(compared) {
+            let measured = ViewMetrics { name: view.name.clone(), time: view.time, metrics: metrics? };
+            seen(&measured, reference, render)?;
+            all.push(measured);
+        }
     }
     let metrics: Vec<ImageMetrics> = all.iter().map(|view| view.metrics).collect();
     let mean = MeanMetrics::of(&metrics).ok_or(SizeMismatch { first: UVec2::ZERO, second: UVec2::ZERO })?;

@@ -181,8 +181,13 @@ impl GpuGaussianCapture {
         if !next.is_complete() {
             self.next = Some(next);
         } else {
-            let levels = next.uploads.into_iter().map(|upload| upload.finish(queue, &renderer.0)).collect();
+            let finish = |upload: CaptureUpload<_>| upload.finish(queue, &renderer.0);
+            let mut levels: Vec<_> = next.uploads.into_iter().map(finish).collect();
             let mut source = next.source;
+            // Gaussians of coarser levels may be outside.
+            if let Some(whole) = levels.first_mut() {
+                whole.bounds = source.bounds();
+            }
             if source.usages() == RenderAssetUsages::RENDER_WORLD {
                 source.release();
             }

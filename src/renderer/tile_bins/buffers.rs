@@ -22,7 +22,7 @@ pub(in crate::renderer) struct BinBuffers {
     /// Counters (see [`BIN_COUNTERS`]), of parts and of bins; the place of each bin.
     pub bins: [wgpu::Buffer; 2],
     pub blend_blocks: wgpu::BindGroup,
-    pub(super) find_surfaces: wgpu::BindGroup,
+    pub(super) find_surfaces: [wgpu::BindGroup; 2],
     pub(super) project_bin: [wgpu::BindGroup; 2],
     pub(super) fill_bins: [wgpu::BindGroup; 2],
     pub(super) sort_bins: [wgpu::BindGroup; 2],
@@ -64,8 +64,8 @@ impl BinBuffers {
         };
         let frame = frame.as_entire_binding();
         let both = [[&bins[0], &bins[1]], [&bins[1], &bins[0]]];
-        let surfaces = [tile_surfaces.as_entire_binding()];
-        let find_surfaces = allocator.bind_group("gs4d find_surfaces", &layouts.find_surfaces, &surfaces);
+        let surfaces = tile_surfaces.as_entire_binding();
+        let find_surfaces = both.map(|[now, _]| group("gs4d find_surfaces", &layouts.find_surfaces, &surfaces, &[now]));
         let project_bin = both.map(|[now, _]| {
             group("gs4d project_bin", &layouts.project_bin, &instance, &[splats, now, entries, visible, &tile_surfaces])
         });

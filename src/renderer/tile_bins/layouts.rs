@@ -27,7 +27,7 @@ impl BinLayouts {
         const BEFORE: Bind = UniformAt(size_of::<MotionUniforms>());
         let new = |label, bindings: &[Bind]| group_layout(device, label, bindings);
         Self {
-            find_surfaces: new("gs4d find_surfaces", &[Write]),
+            find_surfaces: new("gs4d find_surfaces", &[Write, Write]),
             project_bin: new("gs4d project_bin", &[INSTANCE, Write, Write, Write, Write, Read]),
             fill_bins: new("gs4d fill_bins", &[FRAME, Read, Write, Write, Read]),
             // The shader does not read the last but one buffer, the list of the visible splats. Because it is bound, the memory barrier for the

@@ -66,7 +66,7 @@ impl BinBuffers {
         // find_surfaces
         if state.variant.blending.leaves_out_hidden() {
             let Some(find_surfaces) = passes.find_surfaces(state.variant) else { return };
-            frame.dispatch_tiles(pass, find_surfaces, &self.find_surfaces);
+            frame.dispatch_tiles(pass, find_surfaces, &self.find_surfaces[parity]);
         }
 
         // project_bin

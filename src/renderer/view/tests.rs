@@ -4,7 +4,7 @@
 //! splat of an earlier frame. Skipped where there is no GPU.
 
 use super::resources::DesignBuffers;
-use super::{Instance, ViewParameters, ViewRenderer};
+use super::{Instance, OpaqueDepth, ViewParameters, ViewRenderer};
 use crate::gaussian::{Gaussian, Harmonics};
 use crate::renderer::capture::GpuCapture;
 use crate::renderer::design::Design;
@@ -13,7 +13,7 @@ use crate::renderer::layout::Counters;
 use crate::renderer::pipelines::Renderer;
 use crate::renderer::shaders::ShaderChecks;
 use crate::renderer::tile_bins::{BinBuffers, BinVariant, Blending, Lists, MAX_SLOTS};
-use crate::scene::RuntimeScene;
+use crate::scene::{Bounds, RuntimeScene};
 use crate::view::{Appearance, Camera, RasterFov, View};
 use glam::{UVec2, Vec3};
 use std::thread;
@@ -72,9 +72,48 @@ impl Gpu {
 
     /// Draws a frame and returns its counters.
     fn draw(&self, view: &mut ViewRenderer, capture: &GpuCapture, time: f32) -> Counters {
+        self.draw_with(view, capture, time, &ViewParameters::default())
+    }
+
+    /// Draws a frame without depths behind a wall at this depth, and returns its counters.
+    fn draw_behind(&self, view: &mut ViewRenderer, capture: &GpuCapture, wall: f32) -> Counters {
+        let texture = self.context.device.create_texture(&wgpu::TextureDescriptor {
+            label: None,
+            size: wgpu::Extent3d { width: SIZE.x, height: SIZE.y, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::Depth32Float,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::RENDER_ATTACHMENT,
+            view_formats: &[],
+        });
+        let texture = texture.create_view(&wgpu::TextureViewDescriptor::default());
+        let depth_ops = wgpu::Operations { load: wgpu::LoadOp::Clear(0.1 / wall), store: wgpu::StoreOp::Store };
+        let mut encoder = self.context.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        drop(encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &texture,
+                depth_ops: Some(depth_ops),
+                stencil_ops: None,
+            }),
+            ..Default::default()
+        }));
+        self.context.queue.submit([encoder.finish()]);
+        let distance = [0.1, 0.0, 0.0, 1.0];
+        let opaque = Some(OpaqueDepth { texture: &texture, samples: 1, origin: UVec2::ZERO, distance });
+        self.draw_with(view, capture, 0.0, &ViewParameters { opaque, depths: false, ..ViewParameters::default() })
+    }
+
+    fn draw_with(
+        &self,
+        view: &mut ViewRenderer,
+        capture: &GpuCapture,
+        time: f32,
+        parameters: &ViewParameters<'_>,
+    ) -> Counters {
         let GpuContext { device, queue, .. } = &self.context;
         let instances = [Instance { capture, active: None, view: seen(time), appearance: Appearance::default() }];
-        view.prepare(device, queue, &self.renderer, &instances, &ViewParameters::default()).expect("the frame fits");
+        view.prepare(device, queue, &self.renderer, &instances, parameters).expect("the frame fits");
         assert_eq!(view.design(), Design::TileBins, "the scene is small enough for every driver");
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         view.record(&self.renderer, &mut encoder, &instances);
@@ -193,6 +232,36 @@ fn splats_of_a_frame_with_the_same_stamp_are_not_drawn() {
     gpu.draw(&mut view, &capture, 1.0);
     let apart = largest_difference(&gpu.picture(&view), &expected);
     assert!(apart <= 1e-6, "the frame with the stamp of the first frame differs by {apart}");
+}
+
+#[test]
+fn an_instance_behind_all_surfaces_is_left_out_by_its_bounds() {
+    let Some(gpu) = gpu() else { return };
+    let (mut capture, mut view) = (gpu.upload(crowd(500)), gpu.view());
+    let bounds = Bounds { min: Vec3::new(-0.5, -0.5, -0.5), max: Vec3::new(0.5, 1.5, 0.5) };
+    // The Gaussians are 3 to 4 units from the camera. A false box, 12 units away, shows that it decides alone.
+    let false_bounds = Bounds { min: Vec3::new(-1.0, 9.0, -1.0), max: Vec3::new(1.0, 9.5, 1.0) };
+    let before = gpu.draw_behind(&mut view, &capture, 100.0);
+    assert_eq!(before.visible, 500, "all are in front of the wall");
+    let half = gpu.draw_behind(&mut view, &capture, 3.5).visible;
+    assert!((1..500).contains(&half), "the wall is among the Gaussians: {half}");
+    for (bounds, wall, visible, what) in [
+        (bounds, 3.5, half, "a wall in the box hides as many"),
+        (false_bounds, 100.0, 500, "a wall behind the box hides nothing"),
+        (
+            false_bounds,
+            10.0,
+            0,
+            "a wall before the box hides the instance; the farther wall of the last frame is forgotten",
+        ),
+        (false_bounds, 100.0, 500, "a wall behind the box again"),
+        (bounds, 1.0, 0, "a wall before everything"),
+        (bounds, 100.0, 500, "a wall behind everything"),
+    ] {
+        capture.bounds = Some(bounds);
+        let found = gpu.draw_behind(&mut view, &capture, wall);
+        assert_eq!(found.visible, visible, "{what}: {found:?}");
+    }
 }
 
 #[test]
