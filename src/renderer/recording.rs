@@ -63,17 +63,27 @@ impl Recording<'_> {
         }
     }
 
-    /// Records `blend`, `find_surfaces` or `blend_blocks`: a workgroup for each tile. `lists` are the pass's own buffers.
+    /// Records `blend` or `blend_blocks`: a workgroup for each tile. `lists` are the pass's own buffers.
     pub(super) fn dispatch_tiles(
         &self,
         pass: &mut wgpu::ComputePass<'_>,
         pipeline: &wgpu::ComputePipeline,
         lists: &wgpu::BindGroup,
     ) {
-        let tiles = tiles(self.picture);
+        self.dispatch_blocks(pass, pipeline, lists, tiles(self.picture));
+    }
+
+    /// Records a pass over pixels: so many workgroups across and down. `lists` are the pass's own buffers.
+    pub(super) fn dispatch_blocks(
+        &self,
+        pass: &mut wgpu::ComputePass<'_>,
+        pipeline: &wgpu::ComputePipeline,
+        lists: &wgpu::BindGroup,
+        blocks: UVec2,
+    ) {
         pass.set_pipeline(pipeline);
         pass.set_bind_group(0, self.pixel, &[]);
         pass.set_bind_group(1, lists, &[]);
-        pass.dispatch_workgroups(tiles.x, tiles.y, 1);
+        pass.dispatch_workgroups(blocks.x, blocks.y, 1);
     }
 }

@@ -87,7 +87,7 @@ fn find_surfaces(
         pass.set_pipeline(&pipeline);
         pass.set_bind_group(0, &groups[0], &[]);
         pass.set_bind_group(1, &groups[1], &[]);
-        pass.dispatch_workgroups(tiles.x, tiles.y, 1);
+        pass.dispatch_workgroups(tiles.x.div_ceil(2), tiles.y.div_ceil(2), 1);
     }
     encoder.copy_buffer_to_buffer(&written, 0, &copy, 0, surfaces);
     encoder.copy_buffer_to_buffer(&counted, 0, &copy, surfaces, counters);

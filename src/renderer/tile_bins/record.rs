@@ -13,6 +13,7 @@ use super::state::BinState;
 use crate::renderer::layout::BIN_COUNTERS;
 use crate::renderer::recording::Recording;
 use crate::renderer::shaders::Storage;
+use crate::view::tiles;
 use glam::UVec2;
 
 /// Returns the number of splats per workgroup of `colors`, four threads per splat: `SPLATS` of the shader.
@@ -25,6 +26,8 @@ fn colors_of_group(storage: Storage) -> u32 {
 
 /// The largest number of workgroups of `colors` and of `fill_bins`, which loop over the visible splats: enough to occupy any GPU.
 const MOST_GROUPS: u32 = 8192;
+/// The number of workgroups of `colors` where few splats were visible in an earlier frame. A workgroup that finds no splat takes time, too.
+const LEAST_GROUPS: u32 = 1024;
 
 impl BinBuffers {
     /// Clears what the passes of earlier frames have not cleared, before the compute pass of a frame with so many slots.
@@ -66,7 +69,8 @@ impl BinBuffers {
         // find_surfaces
         if state.variant.blending.leaves_out_hidden() {
             let Some(find_surfaces) = passes.find_surfaces(state.variant) else { return };
-            frame.dispatch_tiles(pass, find_surfaces, &self.find_surfaces[parity]);
+            let blocks = tiles(frame.picture).map(|tiles| tiles.div_ceil(2));
+            frame.dispatch_blocks(pass, find_surfaces, &self.find_surfaces[parity], blocks);
         }
 
         // project_bin
@@ -100,7 +104,10 @@ impl BinBuffers {
         // colors
         if has_colors {
             let pipeline = |storage, batched| passes.colors(storage, batched);
-            let groups = |storage, count: u32| count.div_ceil(colors_of_group(storage)).min(MOST_GROUPS);
+            let groups = |storage, count: u32| {
+                let most = state.visible.div_ceil(colors_of_group(storage)).clamp(LEAST_GROUPS, MOST_GROUPS);
+                count.div_ceil(colors_of_group(storage)).min(most)
+            };
             frame.dispatch_parts(pass, pipeline, &self.colors[parity], groups);
         }
         frame.mark(pass);

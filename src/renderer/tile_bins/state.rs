@@ -22,6 +22,8 @@ pub(in crate::renderer) struct BinState {
     pub frame: u32,
     /// Number of splats of the fullest bin of an earlier frame.
     pub fullest: u32,
+    /// Number of visible splats of an earlier frame; `u32::MAX` before any have been counted.
+    pub visible: u32,
     /// Number of bins that the frame recorded last has cleared for the next frame.
     pub cleared: u32,
     /// The wanted capacity.
@@ -36,6 +38,7 @@ impl Default for BinState {
             odd: false,
             frame: 0,
             fullest: 0,
+            visible: u32::MAX,
             cleared: 0,
             room: BinRoom::default(),
         }

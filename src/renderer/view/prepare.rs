@@ -238,6 +238,7 @@ impl ViewRenderer {
             self.statistics.pairs = self.pair_count(&counters);
             if self.design == Design::TileBins {
                 self.bins.fullest = counters.pairs_wanted;
+                self.bins.visible = counters.visible;
             }
             self.make_room(&counters);
         }

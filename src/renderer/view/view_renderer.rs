@@ -239,6 +239,7 @@ impl ViewRenderer {
         self.short_of_room = false;
         self.bins.room = BinRoom::default();
         self.bins.fullest = 0;
+        self.bins.visible = u32::MAX;
         self.statistics = ViewStatistics::default();
     }
 
