@@ -70,7 +70,7 @@
 //!    that the temporal filter leaves, only when a capture enters another segment of time. All captures in a view share one compute
 //!    pass, so that they interleave by depth. Its size is decided on the GPU: nothing is read back inside a frame.
 //! 3. Inside `blend` and `blend_blocks` the depth of opaque meshes cuts the splats, pixel by pixel; before `project_bin`, `find_surfaces` finds the
-//!    farthest mesh of each tile, behind which splats are left out, and of the picture, behind which whole captures are. The composite lays the result over what the
+//!    farthest mesh of each tile, behind which splats are left out, and of the picture, behind which Gaussians are not projected. The composite lays the result over what the
 //!    camera has drawn so far; it, `write_depth` and `write_motion` are the passes in Bevy's pipeline cache.
 //! 4. [`renderer::Headless`] returns the result as a [`Frame`](view::Frame) instead. The `gs4d` command and the tests use it.
 //!

@@ -44,6 +44,13 @@ fn is_present(index: u32) -> bool {
     return marginal_of(instance.time - lifespan.x, lifespan.y) > instance.marginal_cutoff || instance.debug == DEBUG_ACTIVE;
 }
 
+// Returns the depth of the mean of a Gaussian at the time of the instance, camera units.
+fn mean_depth(index: u32) -> f32 {
+    let g = load_gaussian(index);
+    let mean = vec4(g.mean + g.velocity * (instance.time - load_lifespan(index).x), 1.0);
+    return dot(instance.camera_z, mean);
+}
+
 // Projects a Gaussian at the time of the instance.
 fn projection_of(index: u32) -> Projection {
     var p: Projection;

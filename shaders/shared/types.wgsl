@@ -67,8 +67,8 @@ struct InstanceUniforms {
     trained_variance: vec2<f32>,
     // The marginal at and below which a Gaussian is not drawn.
     marginal_cutoff: f32,
-    // No Gaussian of the instance is nearer to the camera, camera units.
-    nearest: f32,
+    // Depth of the center of the instance, camera units.
+    middle: f32,
     // Rows of capture-to-crop-box; the box is from -1 to 1.
     crop_x: vec4<f32>,
     crop_y: vec4<f32>,

@@ -10,6 +10,9 @@
 #import gs4d::filling::{begin_filling, bins, count_splat, filling_of, put_splat, put_wide_splats, reserve_entries, Filling, OWN_BINS}
 #import gs4d::projection::{debug_color, is_present, projection_of}
 #ifdef OPAQUE
+#import gs4d::projection::mean_depth
+#endif
+#ifdef OPAQUE
 #import gs4d::tile::{pack_tiles, tile_index}
 #else
 #import gs4d::tile::pack_tiles
@@ -36,8 +39,18 @@ var<workgroup> own_pairs: atomic<u32>;
 var<workgroup> visible_before: u32;
 
 #ifdef OPAQUE
-// 1: the whole instance is behind the surfaces of all pixels.
-var<workgroup> all_hidden: u32;
+// Depth order of the farthest surface of the picture, behind which no Gaussian is projected. The test costs time where it leaves out few: NEVER
+// unless the center of the instance is behind that surface.
+var<workgroup> hidden_from: u32;
+const NEVER: u32 = 0xffffffffu;
+// Relative margin of the depth of that test: more than its rounding.
+const MARGIN: f32 = 1e-5;
+
+// Returns whether a Gaussian is behind the surfaces of all pixels.
+fn is_behind_all(index: u32, farthest: u32) -> bool {
+    let depth = mean_depth(index);
+    return depth_order(depth - MARGIN * abs(depth)) > farthest;
+}
 
 // Returns whether a splat is behind the surfaces of all pixels of its tiles: `blend_blocks` would show it nowhere.
 fn is_hidden(tiles: vec4<u32>, key: u32) -> bool {
@@ -71,22 +84,25 @@ fn project_bin(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocatio
             atomicStore(&bins[6], 0u);
         }
 #ifdef OPAQUE
-        all_hidden = select(0u, 1u, depth_order(instance.nearest) > atomicLoad(&bins[2]));
+        let farthest = atomicLoad(&bins[2]);
+        hidden_from = select(NEVER, farthest, farthest < depth_order(instance.middle));
 #endif
     }
-#ifdef OPAQUE
-    if workgroupUniformLoad(&all_hidden) != 0u {
-        return;
-    }
-#endif
     for (var i = thread; i < 128u * instance.per_thread; i += 256u) {
         atomicStore(&present[i], 0u);
     }
     workgroupBarrier();
+#ifdef OPAQUE
+    let farthest = workgroupUniformLoad(&hidden_from);
+#endif
     // Absent Gaussians are removed first, so that few threads of the projection are idle.
     let first_of_group = group.x * instance.per_thread * 256u;
     for (var i = thread; i < instance.per_thread * 256u; i += 256u) {
-        if first_of_group + i < instance.count && is_present(index_of(first_of_group + i)) {
+        var drawn = first_of_group + i < instance.count && is_present(index_of(first_of_group + i));
+#ifdef OPAQUE
+        drawn = drawn && (farthest == NEVER || !is_behind_all(index_of(first_of_group + i), farthest));
+#endif
+        if drawn {
             let place = atomicAdd(&present_count, 1u);
             atomicOr(&present[place / 2u], i << (16u * (place & 1u)));
         }

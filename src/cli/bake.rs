@@ -47,6 +47,7 @@ Examples:
   gs4d bake chkpnt30000.pth --data data/toybox --ratio 0.5 --quality small -o toybox.gs4d
   gs4d bake chkpnt30000.pth --data data/toybox --target-size 1.5 -o toybox.gs4d
   gs4d bake data/hook --resolution 2 -o hook.gs4d
+  gs4d bake data/cameras --exposure --environment 256 -o even.gs4d     # real cameras before a background
   gs4d bake hook.trained.gs4d --data data/hook --resolution 2 --target-size 0.6 -o small.gs4d
   gs4d bake n3v.pth --data data/n3v --time-interval 0,10 --max-loss 0.2 --every 20 -o n3v.gs4d
   gs4d bake n3v.pth --data data/n3v --engine gpu --shards 8 -o n3v.gs4d --plan n3v.json
@@ -74,6 +75,10 @@ pub(super) struct Bake {
     /// Steps of training from pictures [default: 20000].
     #[arg(long, help_heading = "Training from pictures", value_name = "N", value_parser = values::count(100_000_000))]
     train_steps: Option<usize>,
+    /// Rows of the environment map that is trained behind the Gaussians, as of gs4d train, for images without transparent pixels and masks
+    /// [default: 0, none].
+    #[arg(long, help_heading = "Training from pictures", value_name = "ROWS", value_parser = clap::value_parser!(u32).range(0..=4096))]
+    environment: Option<u32>,
     #[command(flatten)]
     validation: ValidationArgs,
     /// Share of the Gaussians to remove, 0 to 1.
@@ -122,6 +127,10 @@ pub(super) struct Bake {
     #[arg(long, help_heading = "Experimental", value_name = "HOW", default_value = "deterministic", conflicts_with = "no_fine_tune",
         value_parser = values::one_of(&GradientSums::NAMES))]
     sums: GradientSums,
+    /// Train an exposure for each camera wherever Gaussians are trained, as gs4d train does, for pictures whose cameras differ in exposure or
+    /// white balance. The package has their mean exposure.
+    #[arg(long, conflicts_with = "no_fine_tune")]
+    exposure: bool,
     /// Leave the intermediate results in OUT.bake/ when all is done.
     #[arg(long)]
     keep_work: bool,
@@ -215,7 +224,7 @@ fn job_report(job: Job) -> Report {
 }
 
 /// The options of training, for which a GPU is needed.
-const OF_TRAINING: [&str; 4] = ["--steps", "--batch", "--rounds", "--sums"];
+const OF_TRAINING: [&str; 5] = ["--steps", "--batch", "--rounds", "--sums", "--exposure"];
 
 impl Bake {
     /// Runs every stage whose result is not stored yet.
@@ -289,7 +298,9 @@ impl Bake {
     fn training(&self, settings: &BakeSettings) -> TrainSettings {
         let mut training = TrainSettings::usual(settings.data.clone(), settings.splits);
         training.start.gaussians = self.gaussians.unwrap_or(training.start.gaussians);
-        training.tuning = TrainSettings::tuning(self.train_steps.unwrap_or(TrainSettings::STEPS));
+        training.start.environment = self.environment.unwrap_or(training.start.environment);
+        let steps = self.train_steps.unwrap_or(TrainSettings::STEPS);
+        training.tuning = FineTuneSettings { exposure: self.exposure, ..TrainSettings::tuning(steps) };
         training.capture = self.checkpoint.capture();
         training
     }
@@ -303,7 +314,7 @@ impl Bake {
     fn data(&self) -> Result<&Path, Failure> {
         match (&self.data, self.is_dataset()) {
             (Some(data), false) => {
-                let of_pictures = ["--gaussians", "--train-steps"];
+                let of_pictures = ["--gaussians", "--train-steps", "--environment"];
                 self.given.none_of(&of_pictures, "with a checkpoint: they are of the training from pictures")?;
                 Ok(data)
             }
@@ -352,6 +363,7 @@ impl Bake {
                 steps: self.steps,
                 batch: self.batch,
                 sums: self.sums,
+                exposure: self.exposure,
                 ..FineTuneSettings::default()
             }),
             quality: self.quality,

@@ -103,8 +103,8 @@ pub struct InstanceUniforms {
     pub trained_variance: [f32; 2],
     /// The marginal at and below which a Gaussian is not drawn.
     pub marginal_cutoff: f32,
-    /// No Gaussian of the instance is nearer to the camera, camera units.
-    pub nearest: f32,
+    /// Depth of the center of the instance, camera units; `f32::MIN` if it is not known.
+    pub middle: f32,
     /// Rows of capture-to-crop-box: x.
     pub crop_x: [f32; 4],
     /// Row y.

@@ -184,6 +184,24 @@ fn pictures_are_baked_in_one_command() {
 }
 
 #[test]
+fn a_bake_trains_exposures_and_an_environment_map_on_request() {
+    let Some(capture) = dataset() else { return };
+    let bake = |name: &str, more: &[&str]| {
+        let command = arguments!["bake", &capture.data, "-o", &capture.path(&format!("{name}.gs4d")), "--json"];
+        let short = ["--gaussians", "100", "--train-steps", "20", "--steps", "5", "--rounds", "1", "--keep", "80"];
+        let rest = ["--engine", "gpu", "--validation", "none", "--trust-images"].iter().chain(more);
+        gs4d(&[command.to_vec(), short.iter().chain(rest).map(Into::into).collect()].concat()).json();
+        let trained = capture.path(&format!("{name}.trained.gs4d"));
+        (gs4d(&arguments!["info", &trained, "--json"]).json(), fs::read(trained).expect("the trained capture"))
+    };
+    let (_, plain) = bake("plain", &[]);
+    let (info, with_map) = bake("map", &["--environment", "4"]);
+    assert_eq!(info["environment"], json!([8, 4]), "twice as wide as high: {info}");
+    let (_, exposed) = bake("exposed", &["--exposure"]);
+    assert!(plain != exposed && plain != with_map, "the exposures of the cameras change what is trained");
+}
+
+#[test]
 fn silhouettes_of_other_poses_are_named_as_the_cause() {
     let Some(capture) = dataset() else { return };
     // Every camera looks at the middle, and has its object in a corner.

@@ -113,7 +113,7 @@ fn mirrors() -> [Mirror; 21] {
             binning,
             trained_variance,
             marginal_cutoff,
-            nearest,
+            middle,
             crop_x,
             crop_y,
             crop_z,

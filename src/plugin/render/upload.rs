@@ -184,9 +184,8 @@ impl GpuGaussianCapture {
             let finish = |upload: CaptureUpload<_>| upload.finish(queue, &renderer.0);
             let mut levels: Vec<_> = next.uploads.into_iter().map(finish).collect();
             let mut source = next.source;
-            // Gaussians of coarser levels may be outside.
-            if let Some(whole) = levels.first_mut() {
-                whole.bounds = source.bounds();
+            for level in &mut levels {
+                level.bounds = source.bounds();
             }
             if source.usages() == RenderAssetUsages::RENDER_WORLD {
                 source.release();

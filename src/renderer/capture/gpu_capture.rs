@@ -15,6 +15,7 @@ use crate::renderer::shaders::Storage;
 use crate::scene::filter::segment_of;
 use crate::scene::packed::MAX_STAGES;
 use crate::scene::{ActiveSets, Bounds, CodedColors, ColorDegrees, FilterKind, RuntimeScene, TemporalFilter};
+use glam::Vec4;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// A capture on the GPU: its Gaussians, color and environment map in buffers, in as many parts as the binding limit
@@ -30,7 +31,7 @@ pub struct GpuCapture {
     pub(in crate::renderer) filter: Option<Filter>,
     /// Bytes of its buffers, without the filter.
     bytes: u64,
-    /// The box around its Gaussians at all times at which it is drawn, in capture space, if it is known.
+    /// The box around its Gaussians at all times, in capture space, if it is known. It changes no picture.
     pub(crate) bounds: Option<Bounds>,
     /// Color and time settings of the [`layout::InstanceUniforms`]; the rest is zero.
     settings: layout::InstanceUniforms,
@@ -281,34 +282,16 @@ impl GpuCapture {
             first_entries: self.settings.first_entries,
             time_span: self.settings.time_span,
             marginal_cutoff: self.settings.marginal_cutoff,
-            nearest: self.nearest(view),
+            middle: self.middle(view.camera_z),
             ..*view
         }
     }
 
-    /// Returns a depth such that no Gaussian is nearer to the camera; `f32::MIN` if the bounds are not known, and for the debug view that shows
-    /// Gaussians at times outside their bounds.
-    fn nearest(&self, view: &layout::InstanceUniforms) -> f32 {
-        match self.bounds {
-            Some(bounds) if view.debug != layout::DEBUG_ACTIVE => nearest_depth(bounds, view.camera_z),
-            _ => f32::MIN,
-        }
+    /// Returns the depth of the center of the bounds; `f32::MIN` if they are not known. `row` is row z of capture-to-camera.
+    fn middle(&self, row: [f32; 4]) -> f32 {
+        let depth = |bounds: Bounds| Vec4::from(row).dot(bounds.center().extend(1.0));
+        self.bounds.map(depth).filter(|depth| depth.is_finite()).unwrap_or(f32::MIN)
     }
-}
-
-/// Relative margin of a depth on the host: more than the `f32` rounding of the passes.
-const ROUNDING: f64 = 1e-5;
-
-/// Returns the depth of the nearest corner of a box, less a margin. `row` is row z of capture-to-camera.
-fn nearest_depth(bounds: Bounds, row: [f32; 4]) -> f32 {
-    let (mut depth, mut size) = (f64::from(row[3]), f64::from(row[3]).abs());
-    for axis in 0..3 {
-        let sides = [bounds.min, bounds.max].map(|corner| f64::from(corner[axis]) * f64::from(row[axis]));
-        depth += sides[0].min(sides[1]);
-        size += sides[0].abs().max(sides[1].abs());
-    }
-    let nearest = (depth - ROUNDING * size) as f32;
-    if nearest.is_finite() { nearest } else { f32::MIN }
 }
 
 static NEXT_ID: AtomicU64 = AtomicU64::new(0);
@@ -316,22 +299,4 @@ static NEXT_ID: AtomicU64 = AtomicU64::new(0);
 /// Returns the index of the first entry of each codebook among all entries.
 fn first_entries(colors: &CodedColors) -> [u32; MAX_STAGES] {
     std::array::from_fn(|stage| colors.entries.iter().take(stage).sum())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use glam::Vec3;
-
-    #[test]
-    fn no_point_of_a_box_is_nearer_than_its_nearest_depth() {
-        let bounds = Bounds { min: Vec3::new(-1.0, 2.0, -3.0), max: Vec3::new(4.0, 5.0, 6.0) };
-        let row = [0.6, -0.8, 0.5, 10.0];
-        let found = nearest_depth(bounds, row);
-        let exact = 10.0 - 0.6 * 1.0 - 0.8 * 5.0 - 0.5 * 3.0;
-        assert!(found <= exact && found > exact - 1e-3, "{found} is just before the nearest corner, {exact}");
-        let endless = Bounds { min: Vec3::MIN, max: Vec3::MAX };
-        assert_eq!(nearest_depth(endless, row), f32::MIN, "a box that overflows hides nothing");
-        assert_eq!(nearest_depth(bounds, [f32::NAN; 4]), f32::MIN, "a transform that is not a number hides nothing");
-    }
 }

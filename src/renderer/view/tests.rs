@@ -72,14 +72,14 @@ impl Gpu {
 
     /// Draws a frame and returns its counters.
     fn draw(&self, view: &mut ViewRenderer, capture: &GpuCapture, time: f32) -> Counters {
-        self.draw_with(view, capture, time, &ViewParameters::default())
+        self.draw_with(view, capture, seen(SIZE, time), &ViewParameters::default())
     }
 
     /// Draws a frame without depths behind a wall at this depth, and returns its counters.
-    fn draw_behind(&self, view: &mut ViewRenderer, capture: &GpuCapture, wall: f32) -> Counters {
+    fn draw_behind(&self, view: &mut ViewRenderer, capture: &GpuCapture, size: UVec2, wall: f32) -> Counters {
         let texture = self.context.device.create_texture(&wgpu::TextureDescriptor {
             label: None,
-            size: wgpu::Extent3d { width: SIZE.x, height: SIZE.y, depth_or_array_layers: 1 },
+            size: wgpu::Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 },
             mip_level_count: 1,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
@@ -101,18 +101,19 @@ impl Gpu {
         self.context.queue.submit([encoder.finish()]);
         let distance = [0.1, 0.0, 0.0, 1.0];
         let opaque = Some(OpaqueDepth { texture: &texture, samples: 1, origin: UVec2::ZERO, distance });
-        self.draw_with(view, capture, 0.0, &ViewParameters { opaque, depths: false, ..ViewParameters::default() })
+        let parameters = ViewParameters { opaque, depths: false, ..ViewParameters::default() };
+        self.draw_with(view, capture, seen(size, 0.0), &parameters)
     }
 
     fn draw_with(
         &self,
         view: &mut ViewRenderer,
         capture: &GpuCapture,
-        time: f32,
+        seen: View,
         parameters: &ViewParameters<'_>,
     ) -> Counters {
         let GpuContext { device, queue, .. } = &self.context;
-        let instances = [Instance { capture, active: None, view: seen(time), appearance: Appearance::default() }];
+        let instances = [Instance { capture, active: None, view: seen, appearance: Appearance::default() }];
         view.prepare(device, queue, &self.renderer, &instances, parameters).expect("the frame fits");
         assert_eq!(view.design(), Design::TileBins, "the scene is small enough for every driver");
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
@@ -155,8 +156,8 @@ fn largest_difference(found: &[[f32; 4]], expected: &[[f32; 4]]) -> f32 {
     apart.fold(0.0, f32::max)
 }
 
-fn seen(time: f32) -> View {
-    let camera = Camera::look_at(Vec3::new(0.0, -3.0, 0.0), Vec3::ZERO, Vec3::Z, 0.8, SIZE);
+fn seen(size: UVec2, time: f32) -> View {
+    let camera = Camera::look_at(Vec3::new(0.0, -3.0, 0.0), Vec3::ZERO, Vec3::Z, 0.8, size);
     camera.view(time, RasterFov::Reference)
 }
 
@@ -235,33 +236,32 @@ fn splats_of_a_frame_with_the_same_stamp_are_not_drawn() {
 }
 
 #[test]
-fn an_instance_behind_all_surfaces_is_left_out_by_its_bounds() {
+fn gaussians_behind_the_farthest_surface_are_not_projected_if_the_center_of_the_capture_is_behind_it() {
     let Some(gpu) = gpu() else { return };
-    let (mut capture, mut view) = (gpu.upload(crowd(500)), gpu.view());
-    let bounds = Bounds { min: Vec3::new(-0.5, -0.5, -0.5), max: Vec3::new(0.5, 1.5, 0.5) };
-    // The Gaussians are 3 to 4 units from the camera. A false box, 12 units away, shows that it decides alone.
-    let false_bounds = Bounds { min: Vec3::new(-1.0, 9.0, -1.0), max: Vec3::new(1.0, 9.5, 1.0) };
-    let before = gpu.draw_behind(&mut view, &capture, 100.0);
-    assert_eq!(before.visible, 500, "all are in front of the wall");
-    let half = gpu.draw_behind(&mut view, &capture, 3.5).visible;
-    assert!((1..500).contains(&half), "the wall is among the Gaussians: {half}");
-    for (bounds, wall, visible, what) in [
-        (bounds, 3.5, half, "a wall in the box hides as many"),
-        (false_bounds, 100.0, 500, "a wall behind the box hides nothing"),
-        (
-            false_bounds,
-            10.0,
-            0,
-            "a wall before the box hides the instance; the farther wall of the last frame is forgotten",
-        ),
-        (false_bounds, 100.0, 500, "a wall behind the box again"),
-        (bounds, 1.0, 0, "a wall before everything"),
-        (bounds, 100.0, 500, "a wall behind everything"),
-    ] {
-        capture.bounds = Some(bounds);
-        let found = gpu.draw_behind(&mut view, &capture, wall);
-        assert_eq!(found.visible, visible, "{what}: {found:?}");
-    }
+    let mut gaussians = crowd(500);
+    // More tiles than a thread tests: surfaces hide the splat in every tile, and it is sorted all the same.
+    let mut wide = gaussians[0];
+    (wide.mean, wide.covariance, wide.opacity) = ([0.0, 1.5, 0.0], [4.0, 0.0, 0.0, 1e-3, 0.0, 4.0], 0.5);
+    gaussians.push(wide);
+    let (mut capture, mut view) = (gpu.upload(gaussians), gpu.view());
+    let size = UVec2::splat(400);
+    let mut visible = |bounds, wall| {
+        capture.bounds = bounds;
+        gpu.draw_behind(&mut view, &capture, size, wall).visible
+    };
+    let bounds = |center: f32| {
+        let [min, max] = [-0.5, 0.5].map(|side| Vec3::new(side, center + side, side));
+        Some(Bounds { min, max })
+    };
+    assert_eq!(visible(None, 100.0), 501, "all are in front of the wall");
+    assert_eq!(visible(None, 1.0), 1, "a wall before everything: the wide splat is projected");
+    assert_eq!(visible(bounds(1.0), 1.0), 0, "the center is behind the wall: nothing is projected");
+    assert_eq!(visible(bounds(1.0), 100.0), 501, "the wall of the last frame is forgotten");
+    assert_eq!(visible(bounds(-9.0), 1.0), 1, "the center is in front of the wall: the test is left out");
+    // The camera is 3 units before the origin. The wall is among the Gaussians.
+    let among = visible(bounds(-9.0), 3.5);
+    assert!((2..501).contains(&among), "some are in front of the wall: {among}");
+    assert_eq!(visible(bounds(1.0), 3.5), among - 1, "those in front of the wall, without the wide splat behind it");
 }
 
 #[test]
