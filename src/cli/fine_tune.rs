@@ -16,7 +16,9 @@ use crate::offline::belonging::require_belonging_on_gpu;
 use crate::offline::dataset::Validation;
 use crate::offline::engine::AdapterDescription;
 use crate::offline::files::Files;
-use crate::offline::fine_tune::{FineTuneSettings, FineTuned, Rates, Resume, Terms, TrainingImages, fine_tune};
+use crate::offline::fine_tune::{
+    FineTuneSettings, FineTuned, ImageRoom, Rates, Resume, Terms, TrainingImages, fine_tune,
+};
 use crate::offline::quantize::{CompressSettings, Quality};
 use crate::offline::store::{Key, Store};
 use crate::offline::temporal_filter::needs_views;
@@ -129,7 +131,13 @@ impl FineTune {
             let runtime = scene.clone().into_runtime()?;
             require_belonging_on_gpu(&mut headless, &runtime, &views, runtime.trained_background())?;
         }
-        let images = TrainingImages::load(splits.train.clone(), &splits.validation, &scene.trained_with, progress)?;
+        let images = TrainingImages::load(
+            splits.train.clone(),
+            &splits.validation,
+            &scene.trained_with,
+            ImageRoom::of_system(),
+            progress,
+        )?;
         let key = Key::of_files(&[&self.input])?
             .with(Key::of_images(&splits.train)?)
             .with(Key::of_images(&splits.validation)?)

@@ -5,6 +5,7 @@
 
 use super::dataset::TrainingView;
 use super::engine::Engine;
+use super::memory_check::compared_at_once;
 use super::metrics::{Contrast, Evaluation, EvaluationSettings, MetricSet, ViewMetrics, evaluate};
 use super::{OfflineError, Progress, proceed};
 use crate::scene::RuntimeScene;
@@ -28,7 +29,8 @@ pub fn evaluate_scene(
     progress: &mut dyn Progress,
     mut seen: impl FnMut(&ViewMetrics, &Picture, &Picture) -> Result<(), OfflineError>,
 ) -> Result<Evaluation, OfflineError> {
-    let mut settings = EvaluationSettings::of(&scene.trained_with, metrics);
+    let at_once = compared_at_once(views, metrics);
+    let mut settings = EvaluationSettings { at_once, ..EvaluationSettings::of(&scene.trained_with, metrics) };
     if let Background::Color(color) = background {
         settings.background = color;
     }

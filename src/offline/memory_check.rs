@@ -48,6 +48,11 @@ const MS_SSIM: u64 = 8;
 /// Bytes for each pixel while reference, render and difference are put side by side: a clamped copy, the difference, all three.
 const SIDE_BY_SIDE: u64 = PICTURE + PICTURE + 3 * (PICTURE + WRITTEN);
 
+/// Bytes for each pixel of an image that is compared: as a picture and as it was loaded. The render, also clamped, comes beside.
+const COMPARED: u64 = PICTURE + IMAGE;
+/// Most bytes of views that are compared at once, unless a single one needs more.
+const COMPARED_BYTES: u64 = 1 << 30;
+
 /// Bytes that are assumed to be available without a check.
 const LITTLE: u64 = 1 << 28;
 
@@ -103,18 +108,17 @@ impl Pictures {
         Self { work: (2 * PICTURE).max(loading(held.count)), ..held }
     }
 
-    /// Returns images that are compared with pictures one after the other; `kept`: whether both are also put side by side.
+    /// Returns images that are compared with pictures, [some at a time](compared_at_once); `kept`: whether both are also put side by side.
     pub(crate) fn evaluated(views: &[TrainingView], metrics: MetricSet, kept: bool) -> Self {
-        let measured = [(metrics.flip, FLIP), (metrics.ms_ssim, MS_SSIM), (kept, SIDE_BY_SIDE)];
-        let most = measured.iter().filter(|(wanted, _)| *wanted).map(|(_, bytes)| *bytes).max().unwrap_or(0);
-        // The image, as a picture and as it was loaded; the render, also clamped.
-        let beside = PICTURE + IMAGE;
-        Self { work: beside + 2 * PICTURE + most, ..Self::drawn(largest(sizes(views)), beside) }
+        let at_once = compared_at_once(views, metrics) as u64;
+        let side_by_side = if kept { SIDE_BY_SIDE } else { 0 };
+        let work = at_once * comparing(metrics) + side_by_side;
+        Self { work, ..Self::drawn(largest(sizes(views)), at_once * COMPARED) }
     }
 
-    /// Returns images that a GPU trains on, with the images that it validates on.
-    pub(crate) fn trained(train: &[TrainingView], validation: &[TrainingView]) -> Self {
-        let held = Self::held(sizes(train).chain(sizes(validation)), IMAGE);
+    /// Returns images that a GPU trains on, of these sizes.
+    pub(crate) fn trained(sizes: impl Iterator<Item = UVec2>) -> Self {
+        let held = Self::held(sizes, IMAGE);
         // A validation image is compared as a picture.
         Self { beside: PICTURE, work: loading(held.count), trained: true, ..held }
     }
@@ -179,6 +183,18 @@ impl Pictures {
     }
 }
 
+/// Returns the bytes for each pixel of an image while it is compared with a picture.
+fn comparing(metrics: MetricSet) -> u64 {
+    let measured = [(metrics.flip, FLIP), (metrics.ms_ssim, MS_SSIM)];
+    COMPARED + 2 * PICTURE + measured.iter().filter(|(wanted, _)| *wanted).map(|(_, bytes)| *bytes).max().unwrap_or(0)
+}
+
+/// Returns how many views are compared with their images at once: one for each thread, as far as that takes little memory, and at least one.
+pub(crate) fn compared_at_once(views: &[TrainingView], metrics: MetricSet) -> usize {
+    let each = pixels(largest(sizes(views))).saturating_mul(comparing(metrics)).max(1);
+    rayon::current_num_threads().min((COMPARED_BYTES / each) as usize).max(1)
+}
+
 /// Checks that there is memory and that the GPU can draw, for a picture that is drawn now.
 pub(super) fn require(size: UVec2, headless: Option<&Headless>) -> Result<(), OfflineError> {
     Pictures::drawn(size, 0).require(headless, SMALLER)
@@ -200,6 +216,11 @@ fn largest(sizes: impl IntoIterator<Item = UVec2>) -> UVec2 {
 
 fn pixels(size: UVec2) -> u64 {
     size.as_u64vec2().element_product()
+}
+
+/// Returns the bytes of memory for images that are read once in place of whenever they are needed: three quarters of what is available.
+pub(crate) fn room_for_images() -> u64 {
+    available().map_or(u64::MAX, |bytes| bytes / 4 * 3)
 }
 
 /// Returns the bytes available to this program: those of the system without swapping, or the rest of its address space if that is limited

@@ -10,7 +10,7 @@ use bevy_gs4d::internal::offline::fine_tune::{Sample, Trainer};
 use bevy_gs4d::internal::offline::prune::select;
 use bevy_gs4d::internal::offline::store::{Key, Store};
 use bevy_gs4d::offline::dataset::TrainingView;
-use bevy_gs4d::offline::fine_tune::{FineTuneSettings, Rates, Resume, TrainingImages, fine_tune};
+use bevy_gs4d::offline::fine_tune::{FineTuneSettings, ImageRoom, Rates, Resume, TrainingImages, fine_tune};
 use bevy_gs4d::offline::metrics::SquaredError;
 use bevy_gs4d::offline::quantize::Quality;
 use bevy_gs4d::offline::{NoProgress, OfflineError, Progress};
@@ -44,8 +44,13 @@ impl Lesson {
         dataset::write(&data, &runtime, Vec3::ZERO, 4, 4, UVec2::splat(40), true);
         let splits = Splits::open(&data, &SplitOptions::default(), &scene.trained_with, &mut NoProgress);
         let splits = splits.expect("the dataset was just written");
-        let images =
-            TrainingImages::load(splits.train.clone(), &splits.validation, &scene.trained_with, &mut NoProgress);
+        let images = TrainingImages::load(
+            splits.train.clone(),
+            &splits.validation,
+            &scene.trained_with,
+            ImageRoom::of_system(),
+            &mut NoProgress,
+        );
         Self { scene, images: images.expect("the images were just written"), views: splits.train, folder }
     }
 
@@ -305,7 +310,7 @@ fn captures_of_every_model_and_with_an_environment_map_are_trained() {
         let settings = FineTuneSettings { steps: 20, evaluate_every: 20, ..FineTuneSettings::default() };
         // Validation is on the training views: the test is whether training has an effect.
         let (views, trained_with) = (lesson.views.clone(), &lesson.scene.trained_with);
-        let images = TrainingImages::load(views, &lesson.views, trained_with, &mut NoProgress);
+        let images = TrainingImages::load(views, &lesson.views, trained_with, ImageRoom::of_system(), &mut NoProgress);
         let images = images.expect("the images were just written");
         let tuned = fine_tune(&mut headless, lesson.disturbed(None), &images, &settings, None, &mut NoProgress);
         let tuned = tuned.unwrap_or_else(|error| panic!("{name}: {error}"));
@@ -316,6 +321,28 @@ fn captures_of_every_model_and_with_an_environment_map_are_trained() {
         assert_eq!(found.is_some(), before.is_some(), "{name}: a scene with a map keeps one");
         assert!(found.is_none() || found != before, "{name}: the environment map is trained too");
     }
+}
+
+#[test]
+fn images_that_are_read_when_they_are_needed_train_the_same_scene() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let lesson = Lesson::new();
+    let settings = FineTuneSettings { steps: 20, evaluate_every: 10, ..FineTuneSettings::default() };
+    let (validation, training) = lesson.views.split_at(4);
+    let mut train = |room: ImageRoom| {
+        let trained_with = &lesson.scene.trained_with;
+        let images = TrainingImages::load(training.to_vec(), validation, trained_with, room, &mut NoProgress);
+        let images = images.expect("the images were just written");
+        let tuned = fine_tune(&mut headless, lesson.disturbed(None), &images, &settings, None, &mut NoProgress);
+        (images.in_memory(), tuned.expect("the scene can be trained"))
+    };
+    let (all, expected) = train(ImageRoom::of_system());
+    assert_eq!(all, lesson.views.len(), "there is memory for all images");
+    // An image has 6,400 bytes.
+    let (few, found) = train(ImageRoom { first: 1, all: 3 * 6_400 });
+    assert!((1..=4).contains(&few), "a moment, and as many as have room: {few}");
+    assert!(found.scene == expected.scene, "the same Gaussians, bit for bit");
+    assert_eq!(found.curve, expected.curve, "the same losses, and the same PSNR of validation");
 }
 
 #[test]
@@ -336,7 +363,7 @@ fn validation_views_that_are_reproduced_exactly_do_not_keep_the_first_step() {
         validation.push(view);
     }
     let (views, trained_with) = (lesson.views.clone(), &lesson.scene.trained_with);
-    let images = TrainingImages::load(views, &validation, trained_with, &mut NoProgress);
+    let images = TrainingImages::load(views, &validation, trained_with, ImageRoom::of_system(), &mut NoProgress);
     let images = images.expect("the images were just written");
     let tuned = fine_tune(&mut headless, lesson.disturbed(None), &images, &settings, None, &mut NoProgress);
     let tuned = tuned.expect("the scene can be trained");

@@ -18,7 +18,7 @@ use bevy_gs4d::internal::offline::store::{Key, Store};
 use bevy_gs4d::internal::offline::train::{CaptureSettings, Start, StartSettings, begin, capture_of, train};
 use bevy_gs4d::internal::reference as passes;
 use bevy_gs4d::offline::dataset::TrainingView;
-use bevy_gs4d::offline::fine_tune::{FineTuneSettings, FineTuned, Growth, Rates, Resume, TrainingImages};
+use bevy_gs4d::offline::fine_tune::{FineTuneSettings, FineTuned, Growth, ImageRoom, Rates, Resume, TrainingImages};
 use bevy_gs4d::offline::metrics::SquaredError;
 use bevy_gs4d::offline::{NoProgress, OfflineError, Progress, SplitOptions, Splits};
 use bevy_gs4d::reference;
@@ -411,7 +411,8 @@ impl Lesson {
     ) -> Result<FineTuned, Box<OfflineError>> {
         let (trained_with, playback) = capture_of(&self.all, &CaptureSettings::default()).expect("ten places");
         let Splits { train: views, validation, .. } = &self.splits;
-        let images = TrainingImages::load(views.clone(), validation, &trained_with, &mut NoProgress);
+        let images =
+            TrainingImages::load(views.clone(), validation, &trained_with, ImageRoom::of_system(), &mut NoProgress);
         let images = images.expect("the images were just written");
         let (scene, _) = begin(&images, trained_with, playback, start).expect("the cameras look at the blobs");
         let resume = store.map(|store| Resume { store, key: Key::of(b"blobs"), every: 1 });

@@ -7,7 +7,7 @@ use crate::offline::belonging::require_belonging;
 use crate::offline::convert::require_no_windows;
 use crate::offline::dataset::TrainingView;
 use crate::offline::engine::Engine;
-use crate::offline::fine_tune::{FineTuneSettings, TrainingImages, obstacle};
+use crate::offline::fine_tune::{FineTuneSettings, ImageRoom, TrainingImages, obstacle};
 use crate::offline::jobs::job::{FOLDER, Job, Scoring};
 use crate::offline::memory_check::{BY_RESOLUTION, Pictures};
 use crate::offline::metrics::MetricSet;
@@ -93,7 +93,13 @@ impl<'a> Inputs<'a> {
             return Ok(images.clone());
         }
         let Splits { train, validation, .. } = &self.splits;
-        let images = TrainingImages::load(train.clone(), validation, &self.subject.scene.trained_with, progress)?;
+        let images = TrainingImages::load(
+            train.clone(),
+            validation,
+            &self.subject.scene.trained_with,
+            ImageRoom::of_system(),
+            progress,
+        )?;
         Ok(self.images.insert(Arc::new(images)).clone())
     }
 

@@ -8,6 +8,7 @@ use super::grown::Grown;
 use super::growth::Cloning;
 use super::outcome::FineTuned;
 use super::places::{with_places, without_places};
+use super::prefetch::Prefetch;
 use super::sample::{GpuImage, Sample};
 use super::schedule::{Behind, Rates, Schedule, dropout_seed, noise_seed, relocation_seed};
 use super::settings::FineTuneSettings;
@@ -28,14 +29,15 @@ const VIEWS_OF_ROOM: usize = 64;
 /// Most bytes of images that stay on the GPU.
 const RESIDENT_BYTES: usize = 512 << 20;
 
-/// Uploads images, as many as have room.
-fn resident_images(trainer: &Trainer<'_>, shots: &[Shot]) -> Result<Vec<GpuImage>, OfflineError> {
+/// Uploads images that are in memory, as many as have room. The others are `None`.
+fn resident_images(trainer: &Trainer<'_>, shots: &[Shot]) -> Result<Vec<Option<GpuImage>>, OfflineError> {
     let mut bytes = 0;
-    let fits = |shot: &&Shot| {
-        bytes += 4 * shot.image.texels.len();
-        bytes <= RESIDENT_BYTES
+    let upload = |shot: &Shot| {
+        let Some(image) = &shot.image else { return Ok(None) };
+        bytes += 4 * image.texels.len();
+        (bytes <= RESIDENT_BYTES).then(|| trainer.upload(image)).transpose()
     };
-    Ok(shots.iter().take_while(fits).map(|shot| trainer.upload(&shot.image)).collect::<Result<_, _>>()?)
+    Ok(shots.iter().map(upload).collect::<Result<_, GpuError>>()?)
 }
 
 /// A run of training.
@@ -43,8 +45,9 @@ pub(super) struct Run<'a> {
     pub(super) trainer: Trainer<'a>,
     pub(super) settings: &'a FineTuneSettings,
     images: &'a TrainingImages,
-    /// The images of the first of them, on the GPU; others are uploaded when they are needed.
-    resident: Vec<GpuImage>,
+    /// Those on the GPU; others are uploaded when they are needed.
+    resident: Vec<Option<GpuImage>>,
+    prefetch: Prefetch<'a>,
     background: Background,
     /// Whether backgrounds are random.
     random: bool,
@@ -86,11 +89,10 @@ impl<'a> Run<'a> {
         if cloning.is_some() {
             trainer.set_cloning()?;
         }
-        let random = settings.behind == Behind::Random
-            && background != Background::Environment
-            && images.shots.iter().any(|shot| shot.image.has_gaps);
+        let random = settings.behind == Behind::Random && background != Background::Environment && images.has_gaps();
         let resident = resident_images(&trainer, &images.shots)?;
-        let mut run = Self { trainer, settings, images, resident, background, random, support };
+        let prefetch = Prefetch::new(images);
+        let mut run = Self { trainer, settings, images, resident, prefetch, background, random, support };
         for index in even_subset(&images.views, VIEWS_OF_ROOM) {
             run.trainer.make_room(&images.shots[index].view)?;
         }
@@ -150,16 +152,22 @@ impl<'a> Run<'a> {
         let settings = self.settings;
         let schedule = Schedule { seed: settings.seed, views: self.images.shots.len(), batch: settings.batch };
         let indices = schedule.batch(step);
-        let uploaded = |&index: &usize| match self.resident.get(index) {
-            Some(_) => Ok(None),
-            None => self.trainer.upload(&self.images.shots[index].image).map(Some),
-        };
-        let uploaded: Vec<Option<GpuImage>> = indices.iter().map(uploaded).collect::<Result<_, _>>()?;
+        self.prefetch.follow(&schedule, step);
+        let mut uploaded = Vec::with_capacity(indices.len());
+        for &index in &indices {
+            uploaded.push(match (&self.resident[index], &self.images.shots[index].image) {
+                (Some(_), _) => None,
+                (None, Some(image)) => Some(self.trainer.upload(image)?),
+                (None, None) => Some(self.trainer.upload(&self.prefetch.take(step, index)?)?),
+            });
+        }
         let mut batch = Vec::with_capacity(indices.len());
         for (place, (index, own)) in indices.into_iter().zip(&uploaded).enumerate() {
+            // One of both is there.
+            let Some(image) = own.as_ref().or(self.resident[index].as_ref()) else { continue };
             batch.push(Sample {
                 view: &self.images.shots[index].view,
-                image: own.as_ref().unwrap_or_else(|| &self.resident[index]),
+                image,
                 background: match self.random {
                     true => Background::Color(schedule.background(step, place)),
                     false => self.background,
@@ -249,8 +257,10 @@ fn psnr(
     mut draw: impl FnMut(&View) -> Result<Frame, GpuError>,
 ) -> Result<Option<f64>, OfflineError> {
     let mut error = SquaredError::default();
-    for shot in &images.validation {
-        error.add(&shot.image.over(behind(background)), &draw(&shot.view)?.picture.clamped())?;
+    for some in images.validated() {
+        for (view, image) in some? {
+            error.add(&image.over(behind(background)), &draw(view)?.picture.clamped())?;
+        }
     }
     Ok((!images.validation.is_empty()).then(|| error.psnr()))
 }

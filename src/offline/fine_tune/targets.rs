@@ -1,25 +1,47 @@
-//! The images to train on, in memory.
+//! The images to train on.
 //!
-//! In: training views. Out: their images as one word for each pixel, decoded once, in parallel ([`TrainingImages`]).
+//! In: training views. Out: their images as one word for each pixel, decoded in parallel ([`TrainingImages`]): in memory as many as have room; the
+//! others are read again whenever they are needed ([`Prefetch`](super::prefetch::Prefetch)). What is trained does not depend on which these are.
 
-use crate::offline::dataset::selection::camera_numbers;
-use crate::offline::dataset::{CoveredImage, TrainingView};
-use crate::offline::memory_check::{BY_RESOLUTION, Pictures};
+use crate::offline::dataset::selection::{camera_numbers, even_moments};
+use crate::offline::dataset::{CoveredImage, DatasetError, TrainingView};
+use crate::offline::memory_check::{BY_RESOLUTION, Pictures, room_for_images};
 use crate::offline::{OfflineError, Progress, proceed};
 use crate::renderer::Headless;
 use crate::scene::TrainedWith;
 use crate::view::View;
+use glam::UVec2;
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// Images that are decoded between two reports of progress.
 const AT_ONCE: usize = 16;
 
-/// A view with its image.
+/// A view with its image, if that is in memory.
 #[derive(Debug)]
 pub(super) struct Shot {
     pub view: View,
     pub name: String,
-    pub image: CoveredImage,
+    pub image: Option<CoveredImage>,
+}
+
+/// Most bytes of images in memory.
+#[derive(Debug, Clone, Copy)]
+pub struct ImageRoom {
+    /// Of the images that a training from pictures begins with, which are in memory in any case.
+    pub first: u64,
+    /// Of all images.
+    pub all: u64,
+}
+
+impl ImageRoom {
+    /// The room for the images that a training begins with, whatever memory there is: where it begins must not depend on that.
+    const FIRST: u64 = 2 << 30;
+
+    /// Returns the room that the memory of the system leaves.
+    pub fn of_system() -> Self {
+        Self { first: Self::FIRST, all: room_for_images() }
+    }
 }
 
 /// Training views with their images, for one run of fine-tuning or several.
@@ -30,10 +52,14 @@ pub struct TrainingImages {
     pub(super) shots: Vec<Shot>,
     /// The views on which the best step is chosen.
     pub(super) validation: Vec<Shot>,
+    validation_views: Vec<TrainingView>,
+    /// Indices of the views whose images a training begins with.
+    first: Vec<usize>,
 }
 
 impl TrainingImages {
-    /// Checks that there is memory for the images of these views, and that the GPU can train on them, before any of them is loaded.
+    /// Checks that there is memory for the images that these views need in any case, and that the GPU can train on them, before any of them is
+    /// loaded.
     ///
     /// # Errors
     /// What is needed, what is available, and the remedy.
@@ -42,42 +68,110 @@ impl TrainingImages {
         validation: &[TrainingView],
         headless: &Headless,
     ) -> Result<(), OfflineError> {
-        Pictures::trained(views, validation).require(Some(headless), BY_RESOLUTION)
+        needed(views, validation, ImageRoom::of_system()).require(Some(headless), BY_RESOLUTION)
     }
 
-    /// Loads the images of the views to train on and of those to validate on, which may be none. Begins the task "loading
-    /// images", twice.
+    /// Loads the images of the views to train on and of those to validate on, which may be none, as many as have room. Begins the task "loading
+    /// images".
     ///
     /// # Errors
-    /// Images that are missing, damaged or, together, larger than the memory that is available.
+    /// Images that are missing or damaged, and those that are needed in any case if they are larger than the memory that is available.
     pub fn load(
         views: Vec<TrainingView>,
         validation: &[TrainingView],
         trained_with: &TrainedWith,
+        room: ImageRoom,
         progress: &mut dyn Progress,
     ) -> Result<Self, OfflineError> {
-        Pictures::trained(&views, validation).require_loaded(BY_RESOLUTION)?;
-        let mut shots = |views: &[TrainingView]| -> Result<Vec<Shot>, OfflineError> {
-            let images = load(views, progress)?;
-            let shot = |(view, image): (&TrainingView, CoveredImage)| Shot {
+        needed(&views, validation, room).require_loaded(BY_RESOLUTION)?;
+        let shots = |views: &[TrainingView]| -> Vec<Shot> {
+            let shot = |view: &TrainingView| Shot {
                 view: view.camera.view(view.time, trained_with.raster_fov),
                 name: view.name.clone(),
-                image,
+                image: None,
             };
-            Ok(views.iter().zip(images).map(shot).collect())
+            views.iter().map(shot).collect()
         };
-        let (shots, validation) = (shots(&views)?, shots(validation)?);
-        Ok(Self { views, shots, validation })
+        let first = first(&views, room);
+        let (shots, validation_shots) = (shots(&views), shots(validation));
+        let mut images =
+            Self { shots, validation: validation_shots, validation_views: validation.to_vec(), first, views };
+        images.fill(room, progress)?;
+        Ok(images)
     }
 
-    /// Returns the views that are trained on, with their images.
-    pub(crate) fn pairs(&self) -> impl Iterator<Item = (&View, &CoveredImage)> {
-        self.shots.iter().map(|shot| (&shot.view, &shot.image))
+    /// Loads as many images as have room: those that a training begins with, those of validation, then the others.
+    fn fill(&mut self, room: ImageRoom, progress: &mut dyn Progress) -> Result<(), OfflineError> {
+        let all = (0..self.views.len()).filter(|index| self.first.binary_search(index).is_err());
+        let validated = (0..self.validation.len()).map(|index| (true, index));
+        let mut left = room.all;
+        let mut wanted: Vec<(bool, usize)> = self.first.iter().map(|&index| (false, index)).collect();
+        wanted.iter().for_each(|&(_, index)| left = left.saturating_sub(bytes(&self.views[index])));
+        wanted.extend(validated.chain(all.map(|index| (false, index))).take_while(|&(of_validation, index)| {
+            let view = if of_validation { &self.validation_views[index] } else { &self.views[index] };
+            let fits = bytes(view) <= left;
+            left = left.saturating_sub(bytes(view));
+            fits
+        }));
+        progress.begin("loading images", wanted.len());
+        for some in wanted.chunks(AT_ONCE) {
+            proceed(progress)?;
+            let view = |&(of_validation, index): &(bool, usize)| match of_validation {
+                true => &self.validation_views[index],
+                false => &self.views[index],
+            };
+            let loaded: Vec<_> = some.par_iter().map(|place| view(place).load_covered()).collect();
+            for (&(of_validation, index), image) in some.iter().zip(loaded) {
+                let shots = if of_validation { &mut self.validation } else { &mut self.shots };
+                shots[index].image = Some(image?);
+                progress.advance();
+            }
+        }
+        progress.finish();
+        let (there, count) = (self.in_memory(), self.shots.len() + self.validation.len());
+        if there < count {
+            progress.note(&format!(
+                "{there} of {count} images are in memory, which has no room for more; the others are read whenever they are needed"
+            ));
+        }
+        Ok(())
+    }
+
+    /// Returns the views that a training begins with, with their images.
+    pub(crate) fn first(&self) -> impl Iterator<Item = (&View, &CoveredImage)> {
+        self.first.iter().filter_map(|&index| {
+            let Shot { view, image, .. } = &self.shots[index];
+            image.as_ref().map(|image| (view, image))
+        })
+    }
+
+    /// Returns all views that are trained on.
+    pub(crate) fn all_views(&self) -> impl Iterator<Item = &View> {
+        self.shots.iter().map(|shot| &shot.view)
+    }
+
+    /// Returns whether an image that a training begins with does not cover all pixels.
+    pub(crate) fn has_gaps(&self) -> bool {
+        self.first().any(|(_, image)| image.has_gaps)
+    }
+
+    /// Returns views of validation with their images, some at a time.
+    pub(super) fn validated(&self) -> impl Iterator<Item = Result<Vec<(&View, Cow<'_, CoveredImage>)>, DatasetError>> {
+        let parts = self.validation.chunks(AT_ONCE).zip(self.validation_views.chunks(AT_ONCE));
+        parts.map(|(shots, views)| {
+            let images: Vec<_> = shots.par_iter().zip(views).map(|(shot, view)| image_of(shot, view)).collect();
+            shots.iter().zip(images).map(|(shot, image)| Ok((&shot.view, image?))).collect()
+        })
     }
 
     /// Returns the camera of each view that is trained on, numbered from 0.
     pub(super) fn cameras(&self) -> Vec<u32> {
         camera_numbers(&self.views)
+    }
+
+    /// Returns the number of images in memory, with those of validation.
+    pub fn in_memory(&self) -> usize {
+        self.shots.iter().chain(&self.validation).filter(|shot| shot.image.is_some()).count()
     }
 
     /// Returns the number of views that are trained on.
@@ -91,21 +185,35 @@ impl TrainingImages {
     }
 }
 
-/// Loads the images of all views. Begins the task "loading images".
-///
-/// # Errors
-/// Images that are missing or damaged.
-fn load(views: &[TrainingView], progress: &mut dyn Progress) -> Result<Vec<CoveredImage>, OfflineError> {
-    progress.begin("loading images", views.len());
-    let mut images = Vec::with_capacity(views.len());
-    for some in views.chunks(AT_ONCE) {
-        proceed(progress)?;
-        let loaded: Vec<_> = some.par_iter().map(TrainingView::load_covered).collect();
-        for image in loaded {
-            images.push(image?);
-            progress.advance();
-        }
+/// Returns the image of a view, from memory or from its file.
+fn image_of<'a>(shot: &'a Shot, view: &TrainingView) -> Result<Cow<'a, CoveredImage>, DatasetError> {
+    match &shot.image {
+        Some(image) => Ok(Cow::Borrowed(image)),
+        None => view.load_covered().map(Cow::Owned),
     }
-    progress.finish();
-    Ok(images)
+}
+
+/// Returns the largest number of images that are read ahead of the steps that need them.
+pub(super) fn ahead() -> usize {
+    2 * rayon::current_num_threads()
+}
+
+/// Returns the size of an image in memory.
+fn bytes(view: &TrainingView) -> u64 {
+    view.camera.size.as_u64vec2().element_product().saturating_mul(size_of::<[u8; 4]>() as u64)
+}
+
+/// Returns the indices of the views whose images a training begins with, ascending.
+fn first(views: &[TrainingView], room: ImageRoom) -> Vec<usize> {
+    let largest = views.iter().map(bytes).max().unwrap_or(0).max(1);
+    even_moments(views, usize::try_from(room.first / largest).unwrap_or(usize::MAX).max(1))
+}
+
+/// Returns the images that are in memory in any case: those that a training begins with, and those that are read ahead.
+fn needed(views: &[TrainingView], validation: &[TrainingView], room: ImageRoom) -> Pictures {
+    let sizes: Vec<UVec2> = first(views, room).into_iter().map(|index| views[index].camera.size).collect();
+    let others = views.len() + validation.len() - sizes.len();
+    let largest = views.iter().chain(validation).map(|view| view.camera.size).max_by_key(|size| size.element_product());
+    let ahead = std::iter::repeat_n(largest.unwrap_or_default(), others.min(ahead()));
+    Pictures::trained(sizes.into_iter().chain(ahead))
 }

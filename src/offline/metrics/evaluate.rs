@@ -188,24 +188,15 @@ pub struct EvaluationSettings {
     pub raster_fov: RasterFov,
     /// Which metrics to compute.
     pub metrics: MetricSet,
+    /// Number of views that are compared at the same time, by as many threads.
+    pub at_once: usize,
 }
 
 impl EvaluationSettings {
-    /// Returns settings with the background and the field of view that the capture was trained with.
+    /// Returns settings with the background and the field of view that the capture was trained with, for one view at a time.
     pub fn of(trained: &TrainedWith, metrics: MetricSet) -> Self {
-        Self { background: trained.background, raster_fov: trained.raster_fov, metrics }
+        Self { background: trained.background, raster_fov: trained.raster_fov, metrics, at_once: 1 }
     }
-}
-
-/// Bytes of the images and the renders of the views that are compared at once.
-const AT_ONCE: usize = 1 << 29;
-
-/// Returns the number of views that are compared at once: one for each thread, as far as their pictures are small.
-fn views_at_once(views: &[TrainingView]) -> usize {
-    let pixels = views.iter().map(|view| view.camera.size.as_u64vec2().element_product()).max().unwrap_or(1);
-    // The image, the image over the background, the render as it is and clamped.
-    let fitting = AT_ONCE as u64 / (4 * size_of::<Vec3>() as u64 * pixels.max(1));
-    rayon::current_num_threads().min(fitting as usize).max(1)
 }
 
 /// Compares every view with its image. `draw` renders a view; `seen` is called with the metrics of each view, its image
@@ -224,7 +215,7 @@ where
 {
     let mut all = Vec::with_capacity(views.len());
     let mut has_gaps = false;
-    for some in views.chunks(views_at_once(views)) {
+    for some in views.chunks(settings.at_once.max(1)) {
         let images: Vec<_> = some.par_iter().map(TrainingView::load_covered).collect();
         let mut pairs = Vec::with_capacity(some.len());
         for (view, image) in some.iter().zip(images) {

@@ -105,16 +105,15 @@ pub fn begin(
     playback: PlaybackHints,
     settings: &StartSettings,
 ) -> Result<(GaussianScene, Start), StartError> {
-    let pairs: Vec<(&View, &CoveredImage)> = images.pairs().collect();
-    let has_gaps = pairs.iter().any(|(_, image)| image.has_gaps);
+    let pairs: Vec<(&View, &CoveredImage)> = images.first().collect();
     let rows = settings.environment;
-    if rows > 0 && has_gaps {
+    if rows > 0 && images.has_gaps() {
         return Err(StartError::NoSurroundings);
     }
-    let region = Region::of(pairs.iter().map(|(view, _)| *view))?;
+    let region = Region::of(images.all_views())?;
     let (points, start) = points(&pairs, &region, trained_with.time_interval, settings)?;
     let (span, background) = (trained_with.time_span(), trained_with.background);
-    let usual = || usual_time_scale(pairs.iter().map(|(view, _)| view.time).collect());
+    let usual = || usual_time_scale(images.all_views().map(|view| view.time).collect());
     let scale_t = settings.time_scale.unwrap_or_else(usual) as f32 * span;
     let (degree, degree_t) = (settings.degree.min(3), if settings.degree >= 3 { settings.degree_t.min(2) } else { 0 });
     let scene = GaussianScene {

@@ -8,7 +8,7 @@ use super::start::{Start, StartSettings, begin};
 use super::train;
 use crate::offline::dataset::{TrainingView, require_images};
 use crate::offline::fine_tune::{
-    FineTuneSettings, FineTuned, Growth, Rates, Resume, Terms, TrainingImages, require_room,
+    FineTuneSettings, FineTuned, Growth, ImageRoom, Rates, Resume, Terms, TrainingImages, require_room,
 };
 use crate::offline::splits::{SplitOptions, Splits};
 use crate::offline::store::{Key, Store};
@@ -143,7 +143,8 @@ impl<'a> Training<'a> {
         TrainingImages::require_room(&splits.train, &splits.validation, headless)?;
         require_room(headless, capacity, start.degree, start.degree_t)?;
         let division = splits.to_string();
-        let images = TrainingImages::load(splits.train, &splits.validation, &trained_with, progress)?;
+        let images =
+            TrainingImages::load(splits.train, &splits.validation, &trained_with, ImageRoom::of_system(), progress)?;
         let (scene, started) = begin(&images, trained_with, playback, start)?;
         let resume = Resume { store, key, every: *save_every };
         let (mut tuned, interrupted) = match train(headless, scene, &images, tuning, Some(resume), Some(out), progress)
