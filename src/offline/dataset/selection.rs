@@ -31,8 +31,8 @@ pub fn even_subset(views: &[TrainingView], wanted: usize) -> Vec<usize> {
     subset
 }
 
-/// Returns the indices of all views of evenly chosen moments, ascending: some `wanted` views, at least those of one moment. Returns all indices
-/// if there are no more than `wanted`.
+/// Returns the indices of all views of evenly chosen moments, ascending: at most `wanted` views. If a moment has more, returns an even subset of
+/// all views.
 pub fn even_moments(views: &[TrainingView], wanted: usize) -> Vec<usize> {
     if wanted >= views.len() {
         return (0..views.len()).collect();
@@ -41,7 +41,8 @@ pub fn even_moments(views: &[TrainingView], wanted: usize) -> Vec<usize> {
     let moments: Vec<TrainingView> = views.iter().filter(|view| seen.insert(view.time.to_bits())).cloned().collect();
     let chosen = even_subset(&moments, (wanted * moments.len() / views.len()).max(1));
     let times: HashSet<u32> = chosen.into_iter().map(|index| moments[index].time.to_bits()).collect();
-    (0..views.len()).filter(|&index| times.contains(&views[index].time.to_bits())).collect()
+    let all: Vec<usize> = (0..views.len()).filter(|&index| times.contains(&views[index].time.to_bits())).collect();
+    if all.len() > wanted { even_subset(views, wanted) } else { all }
 }
 
 /// Returns the distinct cameras in the order of the views. Cameras with the same pose, size and lens are the same.
@@ -120,7 +121,7 @@ mod tests {
         let times: HashSet<u32> = chosen.iter().map(|&index| views[index].time.to_bits()).collect();
         assert_eq!((chosen.len(), times.len()), (120, 6), "six of thirty moments, each with all twenty cameras");
         assert!(chosen.is_sorted_by(|a, b| a < b), "indices are ascending and distinct");
-        assert_eq!(even_moments(&views, 1).len(), 20, "at least one moment");
+        assert_eq!(even_moments(&views, 7).len(), 7, "fewer than a moment has");
         assert_eq!(even_moments(&views, 600), Vec::from_iter(0..600), "all");
         assert!(even_moments(&[], 5).is_empty(), "none of none");
     }
