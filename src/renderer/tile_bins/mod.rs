@@ -10,7 +10,8 @@
 //! | `blend_blocks` | pairs, splats and their colors, opaque depth | color and transmittance, expected and median depth |
 //!
 //! In frames behind opaque surfaces, without depths, `find_surfaces` first finds the farthest surface of each tile, and `project_bin` leaves out
-//! the splats that are hidden in all of their tiles.
+//! the splats that are hidden in all of their tiles. If the center of a capture is behind every surface of the picture, its Gaussians that are
+//! behind all of them are not projected.
 //!
 //! Each bin is sorted by one workgroup, in workgroup memory. `blend_blocks` blends each tile in blocks of 8 x 4 pixels.
 //!
