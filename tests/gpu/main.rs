@@ -35,6 +35,7 @@ mod support {
     pub mod capture;
     pub mod composed;
     pub mod dataset;
+    pub mod depth_texture;
     pub mod golden;
     pub mod gpu;
     pub mod limited_device;

@@ -2,33 +2,20 @@
 //!
 //! In: the size and depth of a surface. Out: depth textures, with one sample or four samples.
 
+use super::depth_texture::{depth_target, uniform_depth};
 use bevy_gs4d::renderer::GpuContext;
 use glam::UVec2;
 
 /// Returns a depth texture with the same value everywhere.
 pub fn depth_texture(context: &GpuContext, size: UVec2, value: f32) -> wgpu::TextureView {
-    let texture = texture(context, size, 1);
-    let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-    let mut encoder = context.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    let depth_ops = wgpu::Operations { load: wgpu::LoadOp::Clear(value), store: wgpu::StoreOp::Store };
-    // A render pass that only clears the texture.
-    drop(encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-        depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-            view: &view,
-            depth_ops: Some(depth_ops),
-            stencil_ops: None,
-        }),
-        ..Default::default()
-    }));
-    context.queue.submit([encoder.finish()]);
-    view
+    uniform_depth(&context.device, &context.queue, size, value)
 }
 
 /// Returns a multisampled depth texture, and the index of its middle column. The depth is `near / distance` left of the middle and 0 right of
 /// it; in the middle column half of the samples are covered. `slant` shifts the edge, in picture widths over the picture height.
 pub fn edge(context: &GpuContext, size: UVec2, near: f32, distance: f32, slant: f32) -> (wgpu::Texture, u32) {
     let GpuContext { device, queue, .. } = context;
-    let texture = texture(context, size, 4);
+    let texture = depth_target(device, size, 4);
     let column = size.x / 2;
     // The edge runs through the centers of the column's pixels.
     let end = (column as f32 + 0.5) / size.x as f32 * 2.0 - 1.0;
@@ -85,17 +72,4 @@ pub fn edge(context: &GpuContext, size: UVec2, near: f32, distance: f32, slant: 
     }
     queue.submit([encoder.finish()]);
     (texture, column)
-}
-
-fn texture(context: &GpuContext, size: UVec2, samples: u32) -> wgpu::Texture {
-    context.device.create_texture(&wgpu::TextureDescriptor {
-        label: None,
-        size: wgpu::Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 },
-        mip_level_count: 1,
-        sample_count: samples,
-        dimension: wgpu::TextureDimension::D2,
-        format: wgpu::TextureFormat::Depth32Float,
-        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
-        view_formats: &[],
-    })
 }

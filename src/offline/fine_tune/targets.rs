@@ -72,7 +72,7 @@ impl TrainingImages {
     }
 
     /// Loads the images of the views to train on and of those to validate on, which may be none, as many as have room. Begins the task "loading
-    /// images".
+    /// images", twice.
     ///
     /// # Errors
     /// Images that are missing or damaged, and those that are needed in any case if they are larger than the memory that is available.
@@ -102,32 +102,21 @@ impl TrainingImages {
 
     /// Loads as many images as have room: those that a training begins with, those of validation, then the others.
     fn fill(&mut self, room: ImageRoom, progress: &mut dyn Progress) -> Result<(), OfflineError> {
-        let all = (0..self.views.len()).filter(|index| self.first.binary_search(index).is_err());
-        let validated = (0..self.validation.len()).map(|index| (true, index));
-        let mut left = room.all;
-        let mut wanted: Vec<(bool, usize)> = self.first.iter().map(|&index| (false, index)).collect();
-        wanted.iter().for_each(|&(_, index)| left = left.saturating_sub(bytes(&self.views[index])));
-        wanted.extend(validated.chain(all.map(|index| (false, index))).take_while(|&(of_validation, index)| {
-            let view = if of_validation { &self.validation_views[index] } else { &self.views[index] };
-            let fits = bytes(view) <= left;
-            left = left.saturating_sub(bytes(view));
-            fits
-        }));
-        progress.begin("loading images", wanted.len());
-        for some in wanted.chunks(AT_ONCE) {
-            proceed(progress)?;
-            let view = |&(of_validation, index): &(bool, usize)| match of_validation {
-                true => &self.validation_views[index],
-                false => &self.views[index],
+        let mut left = self.first.iter().fold(room.all, |left, &index| left.saturating_sub(bytes(&self.views[index])));
+        let mut fitting = |views: &[TrainingView], wanted: &mut dyn Iterator<Item = usize>| -> Vec<usize> {
+            let mut fits = |index: &usize| {
+                let fits = bytes(&views[*index]) <= left;
+                left = left.saturating_sub(bytes(&views[*index]));
+                fits
             };
-            let loaded: Vec<_> = some.par_iter().map(|place| view(place).load_covered()).collect();
-            for (&(of_validation, index), image) in some.iter().zip(loaded) {
-                let shots = if of_validation { &mut self.validation } else { &mut self.shots };
-                shots[index].image = Some(image?);
-                progress.advance();
-            }
-        }
-        progress.finish();
+            wanted.take_while(|index| fits(index)).collect()
+        };
+        let validated = fitting(&self.validation_views, &mut (0..self.validation.len()));
+        let is_other = |index: &usize| self.first.binary_search(index).is_err();
+        let others = fitting(&self.views, &mut (0..self.views.len()).filter(is_other));
+        let trained = [&self.first[..], &others].concat();
+        load(&mut self.shots, &self.views, &trained, progress)?;
+        load(&mut self.validation, &self.validation_views, &validated, progress)?;
         let (there, count) = (self.in_memory(), self.shots.len() + self.validation.len());
         if there < count {
             progress.note(&format!(
@@ -183,6 +172,26 @@ impl TrainingImages {
     pub fn is_empty(&self) -> bool {
         self.shots.is_empty()
     }
+}
+
+/// Loads the images of views with these indices. Begins the task "loading images".
+fn load(
+    shots: &mut [Shot],
+    views: &[TrainingView],
+    indices: &[usize],
+    progress: &mut dyn Progress,
+) -> Result<(), OfflineError> {
+    progress.begin("loading images", indices.len());
+    for some in indices.chunks(AT_ONCE) {
+        proceed(progress)?;
+        let loaded: Vec<_> = some.par_iter().map(|&index| views[index].load_covered()).collect();
+        for (&index, image) in some.iter().zip(loaded) {
+            shots[index].image = Some(image?);
+            progress.advance();
+        }
+    }
+    progress.finish();
+    Ok(())
 }
 
 /// Returns the image of a view, from memory or from its file.

@@ -15,10 +15,17 @@ use crate::renderer::shaders::ShaderChecks;
 use crate::renderer::tile_bins::{BinBuffers, BinVariant, Blending, Lists, MAX_SLOTS};
 use crate::scene::{Bounds, RuntimeScene};
 use crate::view::{Appearance, Camera, RasterFov, View};
+use depth_texture::uniform_depth;
 use glam::{UVec2, Vec3};
 use std::thread;
 use std::time::{Duration, Instant};
 
+#[cfg_attr(
+    all(feature = "cli", feature = "viewer"),
+    expect(unreachable_pub, reason = "the integration tests include the same file")
+)]
+#[path = "../../../tests/support/depth_texture.rs"]
+mod depth_texture;
 #[cfg_attr(
     all(feature = "cli", feature = "viewer"),
     expect(unreachable_pub, reason = "the integration tests include the same file")
@@ -77,28 +84,8 @@ impl Gpu {
 
     /// Draws a frame without depths behind a wall at this depth, and returns its counters.
     fn draw_behind(&self, view: &mut ViewRenderer, capture: &GpuCapture, size: UVec2, wall: f32) -> Counters {
-        let texture = self.context.device.create_texture(&wgpu::TextureDescriptor {
-            label: None,
-            size: wgpu::Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: wgpu::TextureFormat::Depth32Float,
-            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::RENDER_ATTACHMENT,
-            view_formats: &[],
-        });
-        let texture = texture.create_view(&wgpu::TextureViewDescriptor::default());
-        let depth_ops = wgpu::Operations { load: wgpu::LoadOp::Clear(0.1 / wall), store: wgpu::StoreOp::Store };
-        let mut encoder = self.context.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        drop(encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                view: &texture,
-                depth_ops: Some(depth_ops),
-                stencil_ops: None,
-            }),
-            ..Default::default()
-        }));
-        self.context.queue.submit([encoder.finish()]);
+        let GpuContext { device, queue, .. } = &self.context;
+        let texture = uniform_depth(device, queue, size, 0.1 / wall);
         let distance = [0.1, 0.0, 0.0, 1.0];
         let opaque = Some(OpaqueDepth { texture: &texture, samples: 1, origin: UVec2::ZERO, distance });
         let parameters = ViewParameters { opaque, depths: false, ..ViewParameters::default() };
