@@ -22,7 +22,7 @@ const FIRST_SEEN: u32 = 3u;
 @compute @workgroup_size(256)
 fn adam(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     for (var i = id.x; i < settings.count * settings.stride; i += groups.x * 256u) {
-        if settings.sparse == 0u || notes[FIRST_SEEN + i / settings.stride] != 0u {
+        if settings.sparse == 0u || notes[FIRST_SEEN + settings.first + i / settings.stride] != 0u {
             let gradient = gradients[i];
             let first = DECAY_1 * first_moments[i] + (1.0 - DECAY_1) * gradient;
             let second = DECAY_2 * second_moments[i] + (1.0 - DECAY_2) * gradient * gradient;

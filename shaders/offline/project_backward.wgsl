@@ -1,5 +1,6 @@
 // project_backward: converts gradients of splats to gradients of raw parameters, through projection, slice, color and activations.
-// In: the inputs and outputs of `project`, the sums of `blend_backward`. Out: the gradients of this view, added to the gradients of the batch.
+// In: the inputs and outputs of `project` for one part, the sums of `blend_backward`. Out: the gradients of this view, added to the gradients of
+// the batch.
 // CPU reference: src/gaussian/gradient.rs; equations: sections 7.2 to 7.4 of the 4DGS model. COMPAT: as the original computes them, with
 // the deviations of section 7.5. ATOMIC_SUMS: `blend_backward` has summed over the pairs of each splat.
 #import gs4d::training::{TrainedRecord, TrainedScene}
@@ -18,7 +19,7 @@ const FRUSTUM_CLAMP: f32 = 1.3;
 const TAU: f32 = 6.2831853;
 // The same value as in `blend_backward`.
 const SUMS: u32 = 10u;
-// Index of the first Gaussian in `notes`.
+// Index of the first of all Gaussians in `notes`.
 const FIRST_SEEN: u32 = 3u;
 
 @group(0) @binding(1) var<uniform> scene: TrainedScene;
@@ -150,16 +151,17 @@ fn color_backward(index: u32, g: vec3<f32>, d: vec3<f32>, tau: f32, is_added: bo
 }
 
 @compute @workgroup_size(64)
-fn project_backward(@builtin(global_invocation_id) id: vec3<u32>) {
-    if id.x >= instance.count {
+fn project_backward(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let thread = id.y * groups.x * 64u + id.x;
+    if thread >= instance.count {
         return;
     }
-    let slot = instance.first_slot + id.x;
+    let slot = instance.first_slot + thread;
     if depth_keys[slot] == INVISIBLE {
         return;
     }
-    let index = index_of(id.x);
-    atomicAdd(&notes[FIRST_SEEN + index], 1u);
+    let index = index_of(thread);
+    atomicAdd(&notes[FIRST_SEEN + scene.first + index], 1u);
     let splat = read_splat(splats[slot]);
     let sums = sums_of(slot);
     if !is_finite(vec4(sums.center, sums.opacity, sums.color.x)) || !is_finite(vec4(sums.conic, sums.color.y + sums.color.z + sums.depth)) {
@@ -176,7 +178,7 @@ fn project_backward(@builtin(global_invocation_id) id: vec3<u32>) {
     let conic = conic_entries(splat.conic);
     let by_center = -vec2(sums.center.x * conic.x + sums.center.y * conic.y, sums.center.y * conic.z + sums.center.x * conic.y);
     let by_ndc = by_center * 0.5 * vec2<f32>(instance.size);
-    let at_length = FIRST_SEEN + scene.count + index;
+    let at_length = FIRST_SEEN + scene.total + scene.first + index;
     atomicStore(&notes[at_length], bitcast<u32>(bitcast<f32>(atomicLoad(&notes[at_length])) + length(by_ndc)));
     let by_conic = vec3(-0.5, -1.0, -0.5) * sums.conic;
     let by_opacity = sums.opacity / splat.opacity;
@@ -289,7 +291,7 @@ fn project_backward(@builtin(global_invocation_id) id: vec3<u32>) {
 // Counts a gradient that is not finite, which is left out.
 fn report(index: u32) {
     if atomicAdd(&notes[0], 1u) == 0u {
-        atomicStore(&notes[1], index + 1u);
+        atomicStore(&notes[1], scene.first + index + 1u);
         atomicStore(&notes[2], scene.view);
     }
 }

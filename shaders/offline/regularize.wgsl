@@ -1,5 +1,5 @@
 // regularize: the terms of the loss that depend on Gaussians alone: motion, difference of motion from neighbors (rigidity), opacity, scale.
-// In: raw parameters, their slice, the neighbors of each Gaussian. Out: the gradients of the terms with respect to the raw parameters, added
+// In: raw parameters of one part, their slice, the neighbors of each Gaussian. Out: the gradients of the terms with respect to the raw parameters, added
 // to the gradients of the batch. CPU reference: src/offline/fine_tune/terms.rs, which defines the terms.
 #import gs4d::training::{TermWeights, TrainedRecord, TrainedScene}
 #import gs4d::types::GaussianRecord
@@ -17,7 +17,7 @@ const LEAST_LENGTH: f32 = 1e-15;
 @group(0) @binding(1) var<uniform> weights: TermWeights;
 @group(0) @binding(2) var<storage, read> trained: array<TrainedRecord>;
 @group(0) @binding(3) var<storage, read> gaussians: array<GaussianRecord>;
-// NEIGHBORS indices for each Gaussian. Read only if the rigid term has a weight.
+// NEIGHBORS indices for each Gaussian. Read only if the rigid term has a weight, which needs that there is one part.
 @group(0) @binding(4) var<storage, read> neighbors: array<u32>;
 @group(0) @binding(5) var<storage, read_write> trained_gradients: array<TrainedRecord>;
 
@@ -31,8 +31,8 @@ fn slope_of_length(v: vec3<f32>) -> vec3<f32> {
 }
 
 @compute @workgroup_size(64)
-fn regularize(@builtin(global_invocation_id) id: vec3<u32>) {
-    let index = id.x;
+fn regularize(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let index = id.y * groups.x * 64u + id.x;
     if index >= scene.count {
         return;
     }

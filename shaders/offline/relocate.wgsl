@@ -1,52 +1,67 @@
 // relocate: gives Gaussians the colors of others, and begins their moments again.
-// In: moves, each from one Gaussian to another that no move to a third starts from, or to itself. Out: the colors of the others; moments are 0, those
-// of the sources too unless they keep them. The raw parameters are written by the host. CPU references: src/offline/fine_tune/relocation.rs,
-// src/offline/fine_tune/cloning.rs.
+// In: moves, each from one Gaussian to another that no move to a third starts from, or to itself; one part of the Gaussians, which may be that of
+// one end of a move alone. Out: `gather` copies the colors that moves start from; after it has done so for all parts, `scatter` writes them where
+// moves lead to. Moments there are 0, those of the sources too unless they keep them. The raw parameters are written by the host. CPU
+// references: src/offline/fine_tune/relocation.rs, src/offline/fine_tune/cloning.rs.
 #import gs4d::training::RelocationUniforms
 
 // Four-vectors of the raw parameters of each Gaussian.
 const GEOMETRY: u32 = 5u;
 
 @group(0) @binding(0) var<uniform> settings: RelocationUniforms;
-// x: where to, y: where from.
+// x: where to, y: where from; indices among all Gaussians.
 @group(0) @binding(1) var<storage, read> moves: array<vec2<u32>>;
-@group(0) @binding(2) var<storage, read_write> colors: array<vec4<f32>>;
-@group(0) @binding(3) var<storage, read_write> first_of_colors: array<vec4<f32>>;
-@group(0) @binding(4) var<storage, read_write> second_of_colors: array<vec4<f32>>;
-@group(0) @binding(5) var<storage, read_write> first_of_geometry: array<vec4<f32>>;
-@group(0) @binding(6) var<storage, read_write> second_of_geometry: array<vec4<f32>>;
+// The color of each move.
+@group(0) @binding(2) var<storage, read_write> moved: array<vec4<f32>>;
+// Of the part.
+@group(0) @binding(3) var<storage, read_write> colors: array<vec4<f32>>;
+@group(0) @binding(4) var<storage, read_write> first_of_colors: array<vec4<f32>>;
+@group(0) @binding(5) var<storage, read_write> second_of_colors: array<vec4<f32>>;
+// Of all Gaussians.
+@group(0) @binding(6) var<storage, read_write> first_of_geometry: array<vec4<f32>>;
+@group(0) @binding(7) var<storage, read_write> second_of_geometry: array<vec4<f32>>;
 
-fn forget_color(at: u32) {
-    first_of_colors[at] = vec4(0.0);
-    second_of_colors[at] = vec4(0.0);
-}
-
-fn forget_geometry(at: u32) {
-    first_of_geometry[at] = vec4(0.0);
-    second_of_geometry[at] = vec4(0.0);
+// Sets the moments of one four-vector of a Gaussian to 0; `own` is its index in the part.
+fn forget(own: u32, place: u32) {
+    if place < settings.stride {
+        first_of_colors[own * settings.stride + place] = vec4(0.0);
+        second_of_colors[own * settings.stride + place] = vec4(0.0);
+    }
+    if place < GEOMETRY {
+        first_of_geometry[(settings.first + own) * GEOMETRY + place] = vec4(0.0);
+        second_of_geometry[(settings.first + own) * GEOMETRY + place] = vec4(0.0);
+    }
 }
 
 @compute @workgroup_size(256)
-fn relocate(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+fn gather(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let width = max(settings.stride, GEOMETRY);
     for (var i = id.x; i < settings.moves * width; i += groups.x * 256u) {
         let place = i % width;
-        let to = moves[i / width].x;
-        let source = moves[i / width].y;
-        if place < settings.stride {
-            if source != to {
-                colors[to * settings.stride + place] = colors[source * settings.stride + place];
+        // The difference wraps if the Gaussian is before the part.
+        let own = moves[i / width].y - settings.first;
+        if own < settings.count {
+            if place < settings.stride {
+                moved[i / width * settings.stride + place] = colors[own * settings.stride + place];
             }
-            forget_color(to * settings.stride + place);
             if settings.keeps == 0u {
-                forget_color(source * settings.stride + place);
+                forget(own, place);
             }
         }
-        if place < GEOMETRY {
-            forget_geometry(to * GEOMETRY + place);
-            if settings.keeps == 0u {
-                forget_geometry(source * GEOMETRY + place);
+    }
+}
+
+@compute @workgroup_size(256)
+fn scatter(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let width = max(settings.stride, GEOMETRY);
+    for (var i = id.x; i < settings.moves * width; i += groups.x * 256u) {
+        let place = i % width;
+        let own = moves[i / width].x - settings.first;
+        if own < settings.count {
+            if place < settings.stride {
+                colors[own * settings.stride + place] = moved[i / width * settings.stride + place];
             }
+            forget(own, place);
         }
     }
 }

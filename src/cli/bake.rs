@@ -315,11 +315,11 @@ impl Bake {
         match (&self.data, self.is_dataset()) {
             (Some(data), false) => {
                 let of_pictures = ["--gaussians", "--train-steps", "--environment"];
-                self.given.none_of(&of_pictures, "with a checkpoint: they are of the training from pictures")?;
+                self.given.none_of(&of_pictures, "with a checkpoint: it is for training from pictures")?;
                 Ok(data)
             }
             (None, true) => {
-                self.given.none_of(&CheckpointArgs::OF_CHECKPOINTS, "with a dataset: they are of checkpoints")?;
+                self.given.none_of(&CheckpointArgs::OF_CHECKPOINTS, "with a dataset: it is for checkpoints")?;
                 Ok(&self.input)
             }
             (Some(_), true) => Err(Failure::about(&self.input, "is the dataset: --data has no effect on it")),

@@ -14,7 +14,7 @@ use super::table::{bytes, lines};
 use crate::offline::dataset::Validation;
 use crate::offline::engine::AdapterDescription;
 use crate::offline::files::Files;
-use crate::offline::fine_tune::{Cloning, FineTuneSettings, FineTuned, Growth, Rates, Terms, require_room};
+use crate::offline::fine_tune::{Cloning, FineTuneSettings, FineTuned, Growth, Rates, Terms};
 use crate::offline::store::Store;
 use crate::offline::train::{CaptureSettings, Start, StartSettings, TrainSettings, TrainedCapture, Training};
 use serde_json::json;
@@ -153,10 +153,6 @@ impl Train {
         let settings = self.settings();
         let training = Training::open(&settings, progress)?;
         let mut headless = self.renderer.open()?;
-        let StartSettings { degree, degree_t, .. } = settings.start;
-        require_room(&headless, settings.capacity(), degree, degree_t).map_err(|error| {
-            Failure::new(format!("{error}; --gaussians and --sh-degree make them fewer or smaller"))
-        })?;
         let deferred = interrupt::defer();
         let trained = training.run(&mut headless, &store, out, progress)?;
         let TrainedCapture { tuned, started, views, splits, interrupted } = &trained;

@@ -77,12 +77,27 @@ pub enum OfflineError {
         /// The option that makes pictures smaller or fewer.
         remedy: &'static str,
     },
-    /// Pictures are too large for the GPU.
+    /// There is too little memory for the Gaussians that would be trained.
+    #[error(
+        "training {count} Gaussians takes up to {:.1} GB of memory, and {:.1} GB are available: {remedy}",
+        *.needed as f64 / 1e9, *.available as f64 / 1e9
+    )]
+    Gaussians {
+        /// Number of Gaussians.
+        count: u64,
+        /// Bytes needed.
+        needed: u64,
+        /// Bytes available.
+        available: u64,
+        /// The options that make them fewer or smaller.
+        remedy: &'static str,
+    },
+    /// Pictures or Gaussians are too large for the GPU.
     #[error("{reason} ({remedy})")]
     Limit {
         /// The limit.
         reason: GpuError,
-        /// The option that makes pictures smaller or fewer.
+        /// The option that makes them smaller or fewer.
         remedy: &'static str,
     },
     /// Two folders have no two pictures of the same name.

@@ -40,11 +40,11 @@ pub struct RoundingRecord {
     pub shape_z: [f32; 4],
 }
 
-/// Settings of the trained scene, and the number of a view.
+/// Settings of one part of the trained scene, and the number of a view.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct TrainedScene {
-    /// Number of Gaussians.
+    /// Number of Gaussians of the part.
     pub count: u32,
     /// 0: static, 1: without 4D rotation, 2: with it.
     pub model: u32,
@@ -52,6 +52,10 @@ pub struct TrainedScene {
     pub prefilter_var: f32,
     /// Number of the view.
     pub view: u32,
+    /// Index of the first Gaussian of the part among all.
+    pub first: u32,
+    /// Number of all Gaussians.
+    pub total: u32,
 }
 
 /// Input of `loss` for one view.
@@ -124,8 +128,10 @@ pub struct AdamUniforms {
     pub sparse: u32,
     /// Number of values of each Gaussian that are updated; the values after these keep their value.
     pub values: u32,
+    /// Index of the first Gaussian of the buffer among all.
+    pub first: u32,
     /// Unused.
-    pub padding: [u32; 2],
+    pub padding: u32,
 }
 
 /// Index of the first Gaussian in the `notes` of `project_backward`, after three words about gradients that are not finite.
@@ -159,21 +165,21 @@ pub struct NoiseUniforms {
     pub least_log_scale_t: f32,
 }
 
-/// Input of `dropout` for one step.
+/// Input of `dropout` for one step and one part.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct DropoutUniforms {
-    /// Number of Gaussians.
+    /// Number of Gaussians of the part.
     pub count: u32,
     /// Seed of the step.
     pub seed: u32,
     /// Gaussians whose random word is below this number are hidden.
     pub below: u32,
-    /// Unused.
-    pub padding: u32,
+    /// Index of the first Gaussian of the part among all.
+    pub first: u32,
 }
 
-/// Input of `relocate`.
+/// Input of `relocate` for one part.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct RelocationUniforms {
@@ -183,6 +189,8 @@ pub struct RelocationUniforms {
     pub stride: u32,
     /// 1: Gaussians that others get their colors from keep their moments.
     pub keeps: u32,
-    /// Unused.
-    pub padding: u32,
+    /// Index of the first Gaussian of the part among all.
+    pub first: u32,
+    /// Number of Gaussians of the part.
+    pub count: u32,
 }

@@ -223,6 +223,17 @@ pub(crate) fn room_for_images() -> u64 {
     available().map_or(u64::MAX, |bytes| bytes / 4 * 3)
 }
 
+/// Checks that there are so many bytes of memory. If the available memory is unknown, all are there.
+///
+/// # Errors
+/// The needed and the available bytes.
+pub(super) fn require_bytes(needed: u64) -> Result<(), (u64, u64)> {
+    match (needed > LITTLE).then(available).flatten() {
+        Some(available) if needed > available => Err((needed, available)),
+        _ => Ok(()),
+    }
+}
+
 /// Returns the bytes available to this program: those of the system without swapping, or the rest of its address space if that is limited
 /// to less; `None` if they are unknown.
 fn available() -> Option<u64> {

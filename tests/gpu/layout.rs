@@ -148,15 +148,15 @@ fn mirrors() -> [Mirror; 21] {
         mirror!(SortStep { shift, source, stride, padding }),
         trained(),
         mirror!(RoundingRecord { mean, velocity, shape_x, shape_y, shape_z }),
-        mirror!(TrainedScene { count, model, prefilter_var, view }),
+        mirror!(TrainedScene { count, model, prefilter_var, view, first, total }),
         mirror!(LossUniforms { background, size, tiles, share, similarity_share, mask_weight, padding }),
         mirror!(ExposureUniforms { background, size, tiles, share, pull, camera, padding }),
         mirror!(TiedColors { count, stride, stages, padding }),
-        mirror!(AdamUniforms { rates, correction, count, stride, sparse, values, padding }),
+        mirror!(AdamUniforms { rates, correction, count, stride, sparse, values, first, padding }),
         mirror!(TermWeights { motion, rigid, opacity, scale }),
         mirror!(NoiseUniforms { count, seed, strength, least_log_scale_t }),
-        mirror!(DropoutUniforms { count, seed, below, padding }),
-        mirror!(RelocationUniforms { moves, stride, keeps, padding }),
+        mirror!(DropoutUniforms { count, seed, below, first }),
+        mirror!(RelocationUniforms { moves, stride, keeps, first, count }),
     ]
 }
 

@@ -27,6 +27,7 @@ mod shaders;
 mod thin;
 mod tile_bins;
 mod train;
+mod train_parts;
 mod uniformity;
 
 #[path = "../support"]

@@ -1,16 +1,21 @@
 //! A device with low limits, on which small scenes reach the limits that huge scenes reach on other devices.
 //!
-//! In: the default adapter. Out: a renderer on that adapter with storage buffer bindings of at most [`BINDING`] bytes.
+//! In: the default adapter, a number of bytes. Out: a renderer on that adapter with storage buffer bindings of at most so many bytes.
 
 use crate::support::no_gpu::no_gpu;
 use bevy_gs4d::renderer::{GpuContext, Headless, ShaderChecks};
 use pollster::block_on;
 
-/// Largest storage buffer binding in bytes.
+/// Largest storage buffer binding in bytes, unless stated.
 pub const BINDING: u64 = 1 << 21;
 
 /// Returns a renderer with shader checks on; without an adapter, reports the skipped test and returns `None`.
 pub fn headless() -> Option<Headless> {
+    binding(BINDING)
+}
+
+/// Returns the same with storage buffer bindings of at most so many bytes.
+pub fn binding(bytes: u64) -> Option<Headless> {
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
         backends: wgpu::Backends::PRIMARY,
         ..wgpu::InstanceDescriptor::new_without_display_handle()
@@ -23,7 +28,7 @@ pub fn headless() -> Option<Headless> {
         no_gpu();
         return None;
     };
-    let limits = wgpu::Limits { max_storage_buffer_binding_size: BINDING, ..adapter.limits() };
+    let limits = wgpu::Limits { max_storage_buffer_binding_size: bytes, ..adapter.limits() };
     let (device, queue) = block_on(adapter.request_device(&wgpu::DeviceDescriptor {
         label: Some("limited"),
         required_limits: limits,

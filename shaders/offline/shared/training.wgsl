@@ -27,14 +27,19 @@ struct RoundingRecord {
     shape_z: vec4<f32>,
 }
 
-// Settings of the trained scene, and the number of a view.
+// Settings of one part of the trained scene, and the number of a view.
 struct TrainedScene {
+    // Number of Gaussians of the part.
     count: u32,
     // 0: static, 1: without 4D rotation, 2: with it.
     model: u32,
     // Added to the temporal variance in the marginal, if positive.
     prefilter_var: f32,
     view: u32,
+    // Index of the first Gaussian of the part among all.
+    first: u32,
+    // Number of all Gaussians.
+    total: u32,
 }
 
 // Input of `loss` for one view.
@@ -90,7 +95,9 @@ struct AdamUniforms {
     sparse: u32,
     // Number of values of each Gaussian that are updated.
     values: u32,
-    padding: vec2<u32>,
+    // Index of the first Gaussian of the buffer among all.
+    first: u32,
+    padding: u32,
 }
 
 // Input of `regularize`: the weights of its terms for each Gaussian.
@@ -116,17 +123,19 @@ struct NoiseUniforms {
     least_log_scale_t: f32,
 }
 
-// Input of `dropout` for one step.
+// Input of `dropout` for one step and one part.
 struct DropoutUniforms {
+    // Number of Gaussians of the part.
     count: u32,
     // Seed of the step.
     seed: u32,
     // Gaussians whose random word is below this number are hidden.
     below: u32,
-    padding: u32,
+    // Index of the first Gaussian of the part among all.
+    first: u32,
 }
 
-// Input of `relocate`.
+// Input of `relocate` for one part.
 struct RelocationUniforms {
     // Number of moves.
     moves: u32,
@@ -134,5 +143,8 @@ struct RelocationUniforms {
     stride: u32,
     // 1: Gaussians that others get their colors from keep their moments.
     keeps: u32,
-    padding: u32,
+    // Index of the first Gaussian of the part among all.
+    first: u32,
+    // Number of Gaussians of the part.
+    count: u32,
 }

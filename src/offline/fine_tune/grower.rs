@@ -4,79 +4,87 @@
 
 use super::dropout::below;
 use super::optimized::ADAM_GROUPS;
-use super::parameters::ParameterBuffers;
+use super::parameters::{ParameterBuffers, TrainedPart};
 use super::relocation::relocate;
 use crate::offline::layout::{DropoutUniforms, NoiseUniforms, RelocationUniforms, TrainedRecord};
 use crate::offline::shaders::SHADERS;
 use crate::renderer::bind::{Bind, group_layout, pipeline};
-use crate::renderer::{GpuError, Headless, ShaderChecks};
+use crate::renderer::memory::binding_limit;
+use crate::renderer::{GpuContext, GpuError, Headless, ShaderChecks};
 use wgpu::BufferUsages;
+
+/// Most bytes of colors that are gathered before they are scattered, and most as a share of a binding.
+const MOVED_BYTES: u64 = 1 << 26;
+const OF_BINDING: u64 = 4;
 
 /// The passes `dropout`, `noise` and `relocate`.
 #[derive(Debug)]
 pub(super) struct Grower {
     dropout: wgpu::ComputePipeline,
-    dropout_settings: wgpu::Buffer,
-    dropout_group: wgpu::BindGroup,
     noise: wgpu::ComputePipeline,
     noise_settings: wgpu::Buffer,
     noise_group: wgpu::BindGroup,
-    relocate: wgpu::ComputePipeline,
+    gather: wgpu::ComputePipeline,
+    scatter: wgpu::ComputePipeline,
     moves: wgpu::Buffer,
+    /// Moves whose colors are gathered at once.
+    at_once: usize,
+    parts: Vec<GrowingPart>,
+}
+
+/// Bindings of the passes for a part of the Gaussians.
+#[derive(Debug)]
+struct GrowingPart {
+    dropout_settings: wgpu::Buffer,
+    dropout_group: wgpu::BindGroup,
     relocation_settings: wgpu::Buffer,
     relocation_group: wgpu::BindGroup,
 }
 
 impl Grower {
-    /// Compiles the passes. `gaussians` are the records that `slice` writes.
+    /// Compiles the passes.
     ///
     /// # Errors
     /// A shader that does not compile.
-    pub(super) fn new(
-        headless: &Headless,
-        parameters: &ParameterBuffers,
-        gaussians: &wgpu::Buffer,
-    ) -> Result<Self, GpuError> {
+    pub(super) fn new(headless: &Headless, parameters: &ParameterBuffers) -> Result<Self, GpuError> {
         use Bind::{Read, Uniform, Write};
         let (allocator, device) = (headless.allocator(), &headless.context().device);
-        let ParameterBuffers { geometry, color, .. } = parameters;
-        let sizes = [size_of::<NoiseUniforms>(), size_of::<RelocationUniforms>()];
-        let size = size_of::<DropoutUniforms>();
-        let layout = group_layout(device, "gs4d dropout", &[Uniform(size), Write]);
+        let geometry = &parameters.geometry;
+        let sizes = [size_of::<DropoutUniforms>(), size_of::<NoiseUniforms>(), size_of::<RelocationUniforms>()];
+        let [of_dropout, of_noise, of_relocation] = sizes;
+        let uniform = |label, size: usize| allocator.buffer(label, size as u64, BufferUsages::UNIFORM);
+        let hiding = group_layout(device, "gs4d dropout", &[Uniform(of_dropout), Write]);
         let shader = SHADERS.module(device, "dropout", &[], ShaderChecks::Off)?;
-        let dropout = pipeline(device, &shader, "dropout", &[Some(&layout)]);
-        let dropout_settings = allocator.buffer("gs4d dropout settings", size as u64, BufferUsages::UNIFORM);
-        let buffers = [&dropout_settings, gaussians].map(wgpu::Buffer::as_entire_binding);
-        let dropout_group = allocator.bind_group("gs4d dropout", &layout, &buffers);
-        let layout = group_layout(device, "gs4d noise", &[Uniform(sizes[0]), Write]);
+        let dropout = pipeline(device, &shader, "dropout", &[Some(&hiding)]);
+        let layout = group_layout(device, "gs4d noise", &[Uniform(of_noise), Write]);
         let shader = SHADERS.module(device, "noise", &[], ShaderChecks::Off)?;
         let noise = pipeline(device, &shader, "noise", &[Some(&layout)]);
-        let noise_settings = allocator.buffer("gs4d noise settings", sizes[0] as u64, BufferUsages::UNIFORM);
+        let noise_settings = uniform("gs4d noise settings", of_noise);
         let buffers = [&noise_settings, &geometry.values].map(wgpu::Buffer::as_entire_binding);
         let noise_group = allocator.bind_group("gs4d noise", &layout, &buffers);
-        let bindings = [Uniform(sizes[1]), Read, Write, Write, Write, Write, Write];
-        let layout = group_layout(device, "gs4d relocation", &bindings);
+        let bindings = [Uniform(of_relocation), Read, Write, Write, Write, Write, Write, Write];
+        let moving = group_layout(device, "gs4d relocation", &bindings);
         let shader = SHADERS.module(device, "relocate", &[], ShaderChecks::Off)?;
-        let relocate = pipeline(device, &shader, "relocate", &[Some(&layout)]);
-        let relocation_settings = allocator.buffer("gs4d relocation settings", sizes[1] as u64, BufferUsages::UNIFORM);
-        let moves = allocator.buffer("gs4d moves", u64::from(parameters.count()) * 8, BufferUsages::STORAGE);
-        let ([_, of_geometry @ ..], [colors, of_colors @ ..]) = (geometry.stored(), color.stored());
-        let written = [colors, of_colors[0], of_colors[1], of_geometry[0], of_geometry[1]];
-        let buffers = [&[&relocation_settings, &moves][..], &written].concat();
-        let resources: Vec<_> = buffers.into_iter().map(wgpu::Buffer::as_entire_binding).collect();
-        let relocation_group = allocator.bind_group("gs4d relocation", &layout, &resources);
-        Ok(Self {
-            dropout,
-            dropout_settings,
-            dropout_group,
-            noise,
-            noise_settings,
-            noise_group,
-            relocate,
-            moves,
-            relocation_settings,
-            relocation_group,
-        })
+        let [gather, scatter] = ["gather", "scatter"].map(|entry| pipeline(device, &shader, entry, &[Some(&moving)]));
+        let each = 16 * u64::from(parameters.stride());
+        let room = MOVED_BYTES.min(binding_limit(&device.limits()) / OF_BINDING);
+        let at_once = (room / each).min(parameters.count().into()).max(1);
+        let moves = allocator.buffer("gs4d moves", at_once * 8, BufferUsages::STORAGE);
+        let moved = allocator.buffer("gs4d moved colors", at_once * each, BufferUsages::STORAGE);
+        let part = |part: &TrainedPart| {
+            let dropout_settings = uniform("gs4d dropout settings", of_dropout);
+            let buffers = [&dropout_settings, &part.gaussians].map(wgpu::Buffer::as_entire_binding);
+            let dropout_group = allocator.bind_group("gs4d dropout", &hiding, &buffers);
+            let relocation_settings = uniform("gs4d relocation settings", of_relocation);
+            let ([_, of_geometry @ ..], of_colors) = (geometry.stored(), part.color.stored());
+            let buffers = [&[&relocation_settings, &moves, &moved][..], &of_colors, &of_geometry].concat();
+            let resources: Vec<_> = buffers.into_iter().map(wgpu::Buffer::as_entire_binding).collect();
+            let relocation_group = allocator.bind_group("gs4d relocation", &moving, &resources);
+            GrowingPart { dropout_settings, dropout_group, relocation_settings, relocation_group }
+        };
+        let parts = parameters.parts.iter().map(part).collect();
+        let at_once = at_once as usize;
+        Ok(Self { dropout, noise, noise_settings, noise_group, gather, scatter, moves, at_once, parts })
     }
 
     /// Records that a share of the Gaussians is hidden until they are sliced again.
@@ -84,15 +92,17 @@ impl Grower {
         &self,
         queue: &wgpu::Queue,
         pass: &mut wgpu::ComputePass<'_>,
-        count: u32,
+        parameters: &ParameterBuffers,
         seed: u32,
         share: f64,
     ) {
-        let settings = DropoutUniforms { count, seed, below: below(share), padding: 0 };
-        queue.write_buffer(&self.dropout_settings, 0, bytemuck::bytes_of(&settings));
         pass.set_pipeline(&self.dropout);
-        pass.set_bind_group(0, &self.dropout_group, &[]);
-        pass.dispatch_workgroups(count.div_ceil(256), 1, 1);
+        for (part, own) in parameters.parts.iter().zip(&self.parts) {
+            let settings = DropoutUniforms { count: part.count(), seed, below: below(share), first: part.first() };
+            queue.write_buffer(&own.dropout_settings, 0, bytemuck::bytes_of(&settings));
+            pass.set_bind_group(0, &own.dropout_group, &[]);
+            pass.dispatch_workgroups(part.count().div_ceil(256), 1, 1);
+        }
     }
 
     /// Records the noise of a step.
@@ -134,22 +144,35 @@ impl Grower {
         if moves.is_empty() {
             return;
         }
-        let ParameterBuffers { geometry, color, .. } = parameters;
         let context = headless.context();
-        let (count, stride) = (moves.len() as u32, color.stride);
-        let settings = RelocationUniforms { moves: count, stride, keeps: keeps.into(), padding: 0 };
-        context.queue.write_buffer(&geometry.values, 0, bytemuck::cast_slice(records));
-        context.queue.write_buffer(&self.moves, 0, bytemuck::cast_slice(moves));
-        context.queue.write_buffer(&self.relocation_settings, 0, bytemuck::bytes_of(&settings));
+        context.queue.write_buffer(&parameters.geometry.values, 0, bytemuck::cast_slice(records));
+        // No move leads to where another begins: those gathered later are still as they were.
+        moves.chunks(self.at_once).for_each(|moves| self.copy(context, parameters, moves, keeps));
+    }
+
+    /// Copies colors by at most as many moves as are gathered at once, and sets moments to 0.
+    fn copy(&self, context: &GpuContext, parameters: &ParameterBuffers, moves: &[[u32; 2]], keeps: bool) {
+        let queue = &context.queue;
+        queue.write_buffer(&self.moves, 0, bytemuck::cast_slice(moves));
+        let (count, stride, keeps) = (moves.len() as u32, parameters.stride(), u32::from(keeps));
+        for (part, own) in parameters.parts.iter().zip(&self.parts) {
+            let (first, gaussians) = (part.first(), part.count());
+            let settings = RelocationUniforms { moves: count, stride, keeps, first, count: gaussians };
+            queue.write_buffer(&own.relocation_settings, 0, bytemuck::bytes_of(&settings));
+        }
         let label = wgpu::CommandEncoderDescriptor { label: Some("gs4d relocation") };
         let mut encoder = context.device.create_command_encoder(&label);
         {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-            let threads = settings.moves * color.stride.max(geometry.stride);
-            pass.set_pipeline(&self.relocate);
-            pass.set_bind_group(0, &self.relocation_group, &[]);
-            pass.dispatch_workgroups(threads.div_ceil(256).min(ADAM_GROUPS), 1, 1);
+            let threads = count * stride.max(parameters.geometry.stride);
+            for pipeline in [&self.gather, &self.scatter] {
+                pass.set_pipeline(pipeline);
+                for own in &self.parts {
+                    pass.set_bind_group(0, &own.relocation_group, &[]);
+                    pass.dispatch_workgroups(threads.div_ceil(256).min(ADAM_GROUPS), 1, 1);
+                }
+            }
         }
-        context.queue.submit([encoder.finish()]);
+        queue.submit([encoder.finish()]);
     }
 }

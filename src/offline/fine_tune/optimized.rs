@@ -11,6 +11,15 @@ use wgpu::BufferUsages;
 /// Most workgroups of `adam`, and of `expand`, which writes the values of the same buffers.
 pub(super) const ADAM_GROUPS: u32 = 4096;
 
+/// Most workgroups in a direction, on every device.
+const MOST_GROUPS: u32 = 65_535;
+
+/// Returns a dispatch of at least so many workgroups, which index Gaussians across and then down.
+pub(super) fn across_and_down(groups: u32) -> [u32; 2] {
+    let across = groups.min(MOST_GROUPS);
+    [across, groups.div_ceil(across.max(1))]
+}
+
 /// Which values a step of `adam` updates.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Extent {
@@ -28,6 +37,8 @@ pub(super) struct Optimized {
     moments: [wgpu::Buffer; 2],
     settings: wgpu::Buffer,
     group: wgpu::BindGroup,
+    /// Index of the first Gaussian among all.
+    first: u32,
     /// Number of Gaussians or entries, and four-vectors of each.
     pub count: u32,
     pub stride: u32,
@@ -52,7 +63,12 @@ impl Optimized {
         let buffers = [&settings, &values, &gradients, &moments[0], &moments[1], notes];
         let resources = buffers.map(wgpu::Buffer::as_entire_binding);
         let group = allocator.bind_group("gs4d adam", &passes.adam_group, &resources);
-        Self { values, gradients, moments, settings, group, count, stride }
+        Self { values, gradients, moments, settings, group, first: 0, count, stride }
+    }
+
+    /// Returns the parameters as those of a part of the Gaussians, the first of which has this index.
+    pub(super) fn beginning_at(self, first: u32) -> Self {
+        Self { first, ..self }
     }
 
     /// Records step number `step`, counted from 1.
@@ -65,7 +81,7 @@ impl Optimized {
         step: usize,
         extent: Extent,
     ) {
-        let Self { count, stride, .. } = *self;
+        let Self { first, count, stride, .. } = *self;
         let settings = AdamUniforms {
             rates,
             correction: correction(step),
@@ -73,7 +89,8 @@ impl Optimized {
             stride,
             sparse: extent.sparse.into(),
             values: extent.values.unwrap_or(4 * stride),
-            padding: [0; 2],
+            first,
+            padding: 0,
         };
         queue.write_buffer(&self.settings, 0, bytemuck::bytes_of(&settings));
         pass.set_pipeline(&passes.adam);

@@ -1,7 +1,8 @@
 //! The parameters of a scene that is trained, on the GPU.
 //!
 //! In: raw parameters of a scene, the buffers of its capture. Out: [`ParameterBuffers`]: parameters and color coefficients with gradients,
-//! moments and notes; commands of the pass `slice`.
+//! moments and notes; commands of the pass `slice`. Raw parameters of all Gaussians are in one buffer. Colors, which are several times as large,
+//! are in as many [parts](TrainedPart) as the capture, so that each can be bound.
 
 use super::optimized::Optimized;
 use super::passes::Passes;
@@ -9,7 +10,8 @@ use super::totals::Faults;
 use crate::gaussian::Model;
 use crate::offline::layout::{FIRST_SEEN, TrainedRecord, TrainedScene};
 use crate::renderer::{GpuError, Headless};
-use wgpu::BufferUsages;
+use std::num::NonZeroU64;
+use wgpu::{BindingResource, BufferUsages};
 
 /// Bytes of the notes of `project_backward` about gradients that are not finite, before two words for each Gaussian.
 const FAULT_BYTES: u64 = 4 * FIRST_SEEN as u64;
@@ -18,61 +20,33 @@ const FAULT_BYTES: u64 = 4 * FIRST_SEEN as u64;
 #[derive(Debug)]
 pub(super) struct ParameterBuffers {
     pub geometry: Optimized,
-    pub color: Optimized,
-    /// One [`TrainedScene`].
-    pub scene_settings: wgpu::Buffer,
+    pub parts: Vec<TrainedPart>,
     /// Gradients that were not finite; how many views since the last step have shown each Gaussian, and its gradients on the screen.
     pub notes: wgpu::Buffer,
+    count: u32,
+}
+
+/// The Gaussians of a part of the capture.
+#[derive(Debug)]
+pub(super) struct TrainedPart {
+    /// Their color coefficients.
+    pub color: Optimized,
+    /// The sliced Gaussians.
+    pub gaussians: wgpu::Buffer,
+    /// The lifespans of the sliced Gaussians.
+    pub lifespans: wgpu::Buffer,
+    /// One [`TrainedScene`].
+    pub scene_settings: wgpu::Buffer,
     /// Bind group of parameters and gradients, for `project_backward`.
     pub group: wgpu::BindGroup,
     settings: TrainedScene,
     slice: wgpu::BindGroup,
 }
 
-/// Returns the settings of a trained scene, for the view number 0.
-pub(super) fn scene_settings(model: Model, count: u32, prefilter_var: f32) -> TrainedScene {
-    let model = match model {
-        Model::Static3d => 0,
-        Model::Unrotated4d => 1,
-        Model::Rotated4d => 2,
-    };
-    TrainedScene { count, model, prefilter_var, view: 0 }
-}
-
-impl ParameterBuffers {
-    /// Uploads raw parameters. The three buffers of the capture hold Gaussians, lifespans and color coefficients; the coefficients, `stride`
-    /// four-vectors for each Gaussian, are trained in place.
-    pub(super) fn new(
-        headless: &Headless,
-        passes: &Passes,
-        settings: TrainedScene,
-        records: &[TrainedRecord],
-        stride: u32,
-        [gaussians, lifespans, harmonics]: [&wgpu::Buffer; 3],
-    ) -> Self {
-        let allocator = headless.allocator();
-        let queue = &headless.context().queue;
-        let storage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
-        let count = settings.count;
-        let raw = allocator.buffer("gs4d trained", size_of_val(records) as u64, storage);
-        queue.write_buffer(&raw, 0, bytemuck::cast_slice(records));
-        let notes = allocator.buffer("gs4d notes", FAULT_BYTES + 8 * u64::from(count), storage);
-        let geometry = Optimized::new(headless, passes, &notes, raw, count, 5);
-        let color = Optimized::new(headless, passes, &notes, harmonics.clone(), count, stride);
-        let uniform = BufferUsages::UNIFORM;
-        let scene_settings = allocator.buffer("gs4d trained scene", size_of::<TrainedScene>() as u64, uniform);
-        let slice = allocator.bind_group(
-            "gs4d slice",
-            &passes.slice_group,
-            &[&scene_settings, &geometry.values, gaussians, lifespans].map(wgpu::Buffer::as_entire_binding),
-        );
-        let buffers = [&geometry.values, &color.values, &geometry.gradients, &color.gradients, &notes];
-        let group = allocator.bind_group(
-            "gs4d parameters",
-            &passes.parameters_group,
-            &buffers.map(wgpu::Buffer::as_entire_binding),
-        );
-        Self { geometry, color, scene_settings, notes, group, settings, slice }
+impl TrainedPart {
+    /// Returns the index of the first Gaussian among all.
+    pub(super) fn first(&self) -> u32 {
+        self.settings.first
     }
 
     /// Returns the number of Gaussians.
@@ -80,17 +54,109 @@ impl ParameterBuffers {
         self.settings.count
     }
 
+    /// Returns the range of a buffer of all Gaussians that holds those of the part, `each` bytes for a Gaussian.
+    pub(super) fn window<'a>(&self, buffer: &'a wgpu::Buffer, each: usize) -> BindingResource<'a> {
+        window(buffer, each, &self.settings)
+    }
+}
+
+/// Parts begin at a multiple of a block of Gaussians, so that the range begins where a binding may.
+fn window<'a>(buffer: &'a wgpu::Buffer, each: usize, part: &TrainedScene) -> BindingResource<'a> {
+    let bytes = |gaussians: u32| u64::from(gaussians) * each as u64;
+    let (offset, size) = (bytes(part.first), NonZeroU64::new(bytes(part.count)));
+    BindingResource::Buffer(wgpu::BufferBinding { buffer, offset, size })
+}
+
+/// Returns the number by which the passes know a model.
+fn number_of(model: Model) -> u32 {
+    match model {
+        Model::Static3d => 0,
+        Model::Unrotated4d => 1,
+        Model::Rotated4d => 2,
+    }
+}
+
+impl ParameterBuffers {
+    /// Uploads raw parameters. `parts` are those of the capture, with their numbers of Gaussians and their buffers of Gaussians, lifespans and color
+    /// coefficients; the coefficients, `stride` four-vectors for each Gaussian, are trained in place.
+    pub(super) fn new<'a>(
+        headless: &Headless,
+        passes: &Passes,
+        (model, prefilter_var): (Model, f32),
+        records: &[TrainedRecord],
+        stride: u32,
+        parts: impl Iterator<Item = (u32, [&'a wgpu::Buffer; 3])>,
+    ) -> Self {
+        let allocator = headless.allocator();
+        let queue = &headless.context().queue;
+        let storage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
+        let total = records.len() as u32;
+        let raw = allocator.buffer("gs4d trained", size_of_val(records) as u64, storage);
+        queue.write_buffer(&raw, 0, bytemuck::cast_slice(records));
+        let notes = allocator.buffer("gs4d notes", FAULT_BYTES + 8 * u64::from(total), storage);
+        let geometry = Optimized::new(headless, passes, &notes, raw, total, 5);
+        let mut first = 0;
+        let part = |(count, [gaussians, lifespans, harmonics]): (u32, [&wgpu::Buffer; 3])| {
+            let settings = TrainedScene { count, model: number_of(model), prefilter_var, view: 0, first, total };
+            first += count;
+            let color = Optimized::new(headless, passes, &notes, harmonics.clone(), count, stride);
+            let color = color.beginning_at(settings.first);
+            let uniform = BufferUsages::UNIFORM;
+            let scene_settings = allocator.buffer("gs4d trained scene", size_of::<TrainedScene>() as u64, uniform);
+            let whole = wgpu::Buffer::as_entire_binding;
+            let [values, gradients] =
+                [&geometry.values, &geometry.gradients].map(|all| window(all, size_of::<TrainedRecord>(), &settings));
+            let sliced = [whole(&scene_settings), values.clone(), whole(gaussians), whole(lifespans)];
+            let slice = allocator.bind_group("gs4d slice", &passes.slice_group, &sliced);
+            let trained = [values, whole(&color.values), gradients, whole(&color.gradients), whole(&notes)];
+            let group = allocator.bind_group("gs4d parameters", &passes.parameters_group, &trained);
+            let (gaussians, lifespans) = (gaussians.clone(), lifespans.clone());
+            TrainedPart { color, gaussians, lifespans, scene_settings, group, settings, slice }
+        };
+        let parts = parts.map(part).collect();
+        Self { geometry, parts, notes, count: total }
+    }
+
+    /// Returns the number of Gaussians.
+    pub(super) fn count(&self) -> u32 {
+        self.count
+    }
+
+    /// Returns the number of four-vectors of the color of each Gaussian.
+    pub(super) fn stride(&self) -> u32 {
+        self.parts.first().map_or(0, |part| part.color.stride)
+    }
+
+    /// Returns the only part.
+    ///
+    /// # Errors
+    /// There are several, and `what` needs all Gaussians in one binding.
+    pub(super) fn only_part(&self, what: &'static str) -> Result<&TrainedPart, GpuError> {
+        match &self.parts[..] {
+            [part] => Ok(part),
+            parts => {
+                let bytes = |part: &TrainedPart| part.color.values.size();
+                let (needed, limit) = (parts.iter().map(bytes).sum(), parts.iter().map(bytes).max().unwrap_or(0));
+                Err(GpuError::TooLarge { what, needed, limit })
+            }
+        }
+    }
+
     /// Writes the settings of the scene for the view of this number.
     pub(super) fn write_scene(&self, queue: &wgpu::Queue, view: u32) {
-        let settings = TrainedScene { view, ..self.settings };
-        queue.write_buffer(&self.scene_settings, 0, bytemuck::bytes_of(&settings));
+        for part in &self.parts {
+            let settings = TrainedScene { view, ..part.settings };
+            queue.write_buffer(&part.scene_settings, 0, bytemuck::bytes_of(&settings));
+        }
     }
 
     /// Records that the parameters are sliced.
     pub(super) fn record_slice(&self, pass: &mut wgpu::ComputePass<'_>, passes: &Passes) {
         pass.set_pipeline(&passes.slice);
-        pass.set_bind_group(0, &self.slice, &[]);
-        pass.dispatch_workgroups(self.count().div_ceil(256), 1, 1);
+        for part in &self.parts {
+            pass.set_bind_group(0, &part.slice, &[]);
+            pass.dispatch_workgroups(part.count().div_ceil(256), 1, 1);
+        }
     }
 
     /// Records that the notes about seen Gaussians are cleared.
@@ -102,5 +168,17 @@ impl ParameterBuffers {
     pub(super) fn faults(&self, headless: &Headless) -> Result<Option<Faults>, GpuError> {
         let bytes = headless.copy_out(&self.notes, FAULT_BYTES)?;
         Ok(Faults::of(bytemuck::pod_read_unaligned(&bytes)))
+    }
+
+    /// Reads the color coefficients of all Gaussians.
+    pub(super) fn read_colors(&self, headless: &Headless) -> Result<Vec<u8>, GpuError> {
+        let parts = self.parts.iter().map(|part| part.color.read_values(headless));
+        Ok(parts.collect::<Result<Vec<_>, _>>()?.concat())
+    }
+
+    /// Reads the gradients of the color coefficients of all Gaussians.
+    pub(super) fn read_color_gradients(&self, headless: &Headless) -> Result<Vec<u8>, GpuError> {
+        let parts = self.parts.iter().map(|part| part.color.read_gradients(headless));
+        Ok(parts.collect::<Result<Vec<_>, _>>()?.concat())
     }
 }

@@ -3,7 +3,8 @@
 //! In: weights, the parameters that are trained. Out: gradients, added to those of the batch.
 
 use super::neighbors::{NEIGHBORS, neighbors};
-use super::parameters::ParameterBuffers;
+use super::optimized::{Optimized, across_and_down};
+use super::parameters::{ParameterBuffers, TrainedPart};
 use super::terms::{MOMENT, Terms};
 use crate::offline::layout::{TermWeights, TrainedRecord, TrainedScene};
 use crate::offline::shaders::SHADERS;
@@ -15,7 +16,8 @@ use wgpu::BufferUsages;
 #[derive(Debug)]
 pub(super) struct Regularizer {
     regularize: wgpu::ComputePipeline,
-    group: wgpu::BindGroup,
+    /// For each part of the Gaussians.
+    groups: Vec<wgpu::BindGroup>,
     neighbors: wgpu::Buffer,
     /// Whether neighbors have been searched for.
     searched: bool,
@@ -24,16 +26,11 @@ pub(super) struct Regularizer {
 }
 
 impl Regularizer {
-    /// Compiles the pass for terms with these weights. `gaussians` is the buffer of sliced Gaussians.
+    /// Compiles the pass for terms with these weights.
     ///
     /// # Errors
-    /// A shader that does not compile.
-    pub(super) fn new(
-        headless: &Headless,
-        parameters: &ParameterBuffers,
-        gaussians: &wgpu::Buffer,
-        terms: &Terms,
-    ) -> Result<Self, GpuError> {
+    /// A rigid term of more Gaussians than a binding holds, a shader that does not compile.
+    pub(super) fn new(headless: &Headless, parameters: &ParameterBuffers, terms: &Terms) -> Result<Self, GpuError> {
         use Bind::{Read, Uniform, Write};
         let (allocator, device) = (headless.allocator(), &headless.context().device);
         let count = parameters.count() as usize;
@@ -51,14 +48,25 @@ impl Regularizer {
         };
         headless.context().queue.write_buffer(&weights, 0, bytemuck::bytes_of(&settings));
         let search_every = (terms.rigid > 0.0).then(|| terms.search_every.max(1));
+        if search_every.is_some() {
+            // Neighbors are of all Gaussians.
+            parameters.only_part("the Gaussians of a rigid term")?;
+        }
         let listed = if search_every.is_some() { count * NEIGHBORS } else { 1 };
         let storage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
         let neighbors = allocator.buffer("gs4d neighbors", (listed * size_of::<u32>()) as u64, storage);
-        let ParameterBuffers { geometry, scene_settings, .. } = parameters;
-        let buffers = [scene_settings, &weights, &geometry.values, gaussians, &neighbors, &geometry.gradients];
-        let group = allocator.bind_group("gs4d terms", &layout, &buffers.map(wgpu::Buffer::as_entire_binding));
+        let group = |part: &TrainedPart| {
+            let TrainedPart { scene_settings, gaussians, .. } = part;
+            let [read, listed] = [[scene_settings, &weights], [gaussians, &neighbors]]
+                .map(|buffers| buffers.map(wgpu::Buffer::as_entire_binding));
+            let Optimized { values, gradients, .. } = &parameters.geometry;
+            let [values, gradients] = [values, gradients].map(|all| [part.window(all, size_of::<TrainedRecord>())]);
+            let resources = [&read[..], &values, &listed, &gradients].concat();
+            allocator.bind_group("gs4d terms", &layout, &resources)
+        };
+        let groups = parameters.parts.iter().map(group).collect();
         let regularize = pipeline(device, &shader, "regularize", &[Some(&layout)]);
-        Ok(Self { regularize, group, neighbors, searched: false, search_every })
+        Ok(Self { regularize, groups, neighbors, searched: false, search_every })
     }
 
     /// Searches for the neighbors of all Gaussians at their current means if the search is due: before the first step, then after every
@@ -81,11 +89,14 @@ impl Regularizer {
         Ok(())
     }
 
-    /// Records that the gradients of the terms are added to those of `count` Gaussians.
-    pub(super) fn record(&self, pass: &mut wgpu::ComputePass<'_>, count: u32) {
+    /// Records that the gradients of the terms are added to those of the Gaussians.
+    pub(super) fn record(&self, pass: &mut wgpu::ComputePass<'_>, parameters: &ParameterBuffers) {
         pass.set_pipeline(&self.regularize);
-        pass.set_bind_group(0, &self.group, &[]);
-        pass.dispatch_workgroups(count.div_ceil(64), 1, 1);
+        for (part, group) in parameters.parts.iter().zip(&self.groups) {
+            pass.set_bind_group(0, group, &[]);
+            let [across, down] = across_and_down(part.count().div_ceil(64));
+            pass.dispatch_workgroups(across, down, 1);
+        }
     }
 
     /// Replaces the neighbors of all Gaussians by those of a state, if it has as many.

@@ -3,7 +3,7 @@
 //! In: the parameters that are trained, the bits of their geometry. Out: records that are drawn as if they had been packed and read again.
 //! Gradients pass straight through to the parameters, which stay as they are: these move on until they are rounded to something else.
 
-use super::parameters::ParameterBuffers;
+use super::parameters::{ParameterBuffers, TrainedPart};
 use super::trainer_error::TrainerError;
 use crate::gaussian::{Parameters, SliceSettings};
 use crate::offline::layout::{RoundingRecord, TrainedScene};
@@ -31,7 +31,8 @@ pub(super) fn steps_between(gaussians: usize) -> usize {
 #[derive(Debug)]
 pub(super) struct Rounder {
     rounding: wgpu::ComputePipeline,
-    group: wgpu::BindGroup,
+    /// For each part of the Gaussians.
+    groups: Vec<wgpu::BindGroup>,
     /// What rounding changes of each Gaussian.
     pub changes: wgpu::Buffer,
 }
@@ -41,11 +42,7 @@ impl Rounder {
     ///
     /// # Errors
     /// A shader that does not compile.
-    pub(super) fn new(
-        headless: &Headless,
-        parameters: &ParameterBuffers,
-        [gaussians, lifespans]: [&wgpu::Buffer; 2],
-    ) -> Result<Self, GpuError> {
+    pub(super) fn new(headless: &Headless, parameters: &ParameterBuffers) -> Result<Self, GpuError> {
         use Bind::{Read, Uniform, Write};
         let (allocator, device) = (headless.allocator(), &headless.context().device);
         let bindings = [Uniform(size_of::<TrainedScene>()), Read, Write, Write];
@@ -54,10 +51,15 @@ impl Rounder {
         // As large as the raw parameters, which fit one binding.
         let size = (parameters.count() as usize * size_of::<RoundingRecord>()) as u64;
         let changes = allocator.buffer("gs4d rounding", size, BufferUsages::STORAGE | BufferUsages::COPY_SRC);
-        let buffers = [&parameters.scene_settings, &changes, gaussians, lifespans];
-        let group = allocator.bind_group("gs4d rounding", &layout, &buffers.map(wgpu::Buffer::as_entire_binding));
+        let group = |part: &TrainedPart| {
+            let [settings, gaussians, lifespans] =
+                [&part.scene_settings, &part.gaussians, &part.lifespans].map(wgpu::Buffer::as_entire_binding);
+            let own = part.window(&changes, size_of::<RoundingRecord>());
+            allocator.bind_group("gs4d rounding", &layout, &[settings, own, gaussians, lifespans])
+        };
+        let groups = parameters.parts.iter().map(group).collect();
         let rounding = pipeline(device, &shader, "rounding", &[Some(&layout)]);
-        Ok(Self { rounding, group, changes })
+        Ok(Self { rounding, groups, changes })
     }
 
     /// Writes the changes of all Gaussians.
@@ -65,11 +67,13 @@ impl Rounder {
         queue.write_buffer(&self.changes, 0, bytemuck::cast_slice(changes));
     }
 
-    /// Records that so many workgroups of 256 Gaussians, which have been sliced, are rounded.
-    pub(super) fn record(&self, pass: &mut wgpu::ComputePass<'_>, groups: u32) {
+    /// Records that the Gaussians, which have been sliced, are rounded.
+    pub(super) fn record(&self, pass: &mut wgpu::ComputePass<'_>, parameters: &ParameterBuffers) {
         pass.set_pipeline(&self.rounding);
-        pass.set_bind_group(0, &self.group, &[]);
-        pass.dispatch_workgroups(groups, 1, 1);
+        for (part, group) in parameters.parts.iter().zip(&self.groups) {
+            pass.set_bind_group(0, group, &[]);
+            pass.dispatch_workgroups(part.count().div_ceil(256), 1, 1);
+        }
     }
 }
 

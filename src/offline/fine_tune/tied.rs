@@ -3,7 +3,7 @@
 //! In: codebooks for the colors of the scene that is trained. Out: the codebooks after some steps.
 
 use super::optimized::{ADAM_GROUPS, Optimized};
-use super::parameters::ParameterBuffers;
+use super::parameters::{ParameterBuffers, TrainedPart};
 use super::passes::Passes;
 use super::trainer_error::TrainerError;
 use crate::offline::layout::TiedColors;
@@ -25,14 +25,14 @@ impl Tied {
     /// Uploads codebooks for all color coefficients but the first of each Gaussian. Rows are Gaussians.
     ///
     /// # Errors
-    /// Codebooks of other Gaussians or coefficients.
+    /// Codebooks of other Gaussians or coefficients, more Gaussians than a binding holds.
     pub(super) fn new(
         headless: &Headless,
         passes: &Passes,
         parameters: &ParameterBuffers,
         books: Centers,
     ) -> Result<Self, TrainerError> {
-        let ParameterBuffers { color, notes, .. } = parameters;
+        let TrainedPart { color, .. } = parameters.only_part("the Gaussians that codebooks give colors")?;
         let (count, stride) = (color.count as usize, color.stride);
         let sizes: Vec<usize> = books.entries.iter().map(|book| book.nrows()).collect();
         let fits = |(codes, size): (&Vec<u32>, &usize)| {
@@ -80,7 +80,7 @@ impl Tied {
         let firsts = filled("gs4d first members", bytemuck::cast_slice(&firsts), storage);
         let members = filled("gs4d members", bytemuck::cast_slice(&members.concat()), storage);
         let values = filled("gs4d entries", bytemuck::cast_slice(&values), storage);
-        let entries = Optimized::new(headless, passes, notes, values, total as u32, stride);
+        let entries = Optimized::new(headless, passes, &parameters.notes, values, total as u32, stride);
         let Optimized { values, gradients, .. } = &entries;
         let buffers = [&settings, &codes, &firsts, &members, values, &color.values, &color.gradients, gradients];
         let group =
@@ -96,8 +96,13 @@ impl Tied {
     }
 
     /// Records that the coefficients become the sums of their entries.
-    pub(super) fn record_expand(&self, pass: &mut wgpu::ComputePass<'_>, passes: &Passes, color: &Optimized) {
-        let values = color.count * color.stride;
+    pub(super) fn record_expand(
+        &self,
+        pass: &mut wgpu::ComputePass<'_>,
+        passes: &Passes,
+        parameters: &ParameterBuffers,
+    ) {
+        let values = parameters.count() * parameters.stride();
         pass.set_pipeline(&passes.expand);
         pass.set_bind_group(0, &self.group, &[]);
         pass.dispatch_workgroups(values.div_ceil(256).min(ADAM_GROUPS), 1, 1);

@@ -27,10 +27,11 @@ use super::cloning::Densified;
 use super::exposure::Exposure;
 use super::grower::Grower;
 use super::optimized::{Extent, Optimized};
-use super::parameters::{ParameterBuffers, scene_settings};
+use super::parameters::ParameterBuffers;
 use super::passes::Passes;
 use super::records::{records, set_harmonics, set_parameters};
 use super::regularizer::Regularizer;
+use super::room::{bytes, require_gaussians, stride};
 use super::rounding::{Rounder, changes};
 use super::sample::{GpuImage, Sample};
 use super::schedule::Rates;
@@ -42,17 +43,17 @@ use super::totals::{Faults, Totals};
 use super::trained_environment::TrainedEnvironment;
 use super::trained_exposure::TrainedExposure;
 use super::trainer_error::TrainerError;
-use crate::gaussian::harmonics::evaluated;
 use crate::gaussian::{GradientMode, Model};
 use crate::offline::dataset::CoveredImage;
 use crate::offline::layout::{LossUniforms, NoiseUniforms, TrainedRecord};
 use crate::offline::quantize::codebook::Centers;
 use crate::offline::shaders::{COMPAT, COMPAT_WITHOUT_TIME};
-use crate::renderer::memory::binding_limit;
+use crate::renderer::memory::with_room;
 use crate::renderer::{GpuCapture, GpuError, Headless, ShaderChecks};
 use crate::scene::{Bits, Environment, GaussianScene, SceneForm, TemporalFilter, Trained};
 use crate::view::{Background, Frame, View};
 use std::collections::VecDeque;
+use std::iter;
 
 /// Steps that may be submitted before the first of them has finished.
 const STEPS_IN_FLIGHT: usize = 4;
@@ -132,11 +133,16 @@ impl<'a> Trainer<'a> {
         let degrees = runtime.form.color_degrees();
         let stride = stride(degrees.degree, degrees.degree_t);
         let count = runtime.len() as u32;
-        require_gaussians(headless, count.into(), stride)?;
-        let capture = headless.upload(&runtime)?;
-        let Some(writable) = capture.writable() else { return Err(TrainerError::Empty) };
-        let settings = scene_settings(model, count, scene.trained_with.prefilter_var);
-        let parameters = ParameterBuffers::new(headless, &passes, settings, &records, stride, writable);
+        require_gaussians(headless, count.into())?;
+        if count == 0 {
+            return Err(TrainerError::Empty);
+        }
+        let settings = (model, scene.trained_with.prefilter_var);
+        let (capture, parameters) = with_room(&headless.context().device, bytes(count.into(), stride), || {
+            let capture = headless.upload(&runtime)?;
+            let parameters = ParameterBuffers::new(headless, &passes, settings, &records, stride, capture.writable());
+            Ok::<_, GpuError>((capture, parameters))
+        })??;
         let backward = Backward::new(headless, sums);
         let environment = match (&scene.environment, capture.environment()) {
             (Some(Environment { texels, .. }), Some(map)) => {
@@ -214,10 +220,7 @@ impl<'a> Trainer<'a> {
             return Err(TrainerError::Weight { term, weight });
         }
         self.regularizer = match terms.is_regularizing() {
-            true => {
-                let Some([gaussians, ..]) = self.capture.writable() else { return Err(TrainerError::Empty) };
-                Some(Regularizer::new(self.headless, &self.parameters, gaussians, &terms)?)
-            }
+            true => Some(Regularizer::new(self.headless, &self.parameters, &terms)?),
             false => None,
         };
         self.mask_weight = terms.mask as f32;
@@ -333,7 +336,7 @@ impl<'a> Trainer<'a> {
     pub fn accumulate_terms(&mut self, step: usize) -> Result<(), GpuError> {
         let Some(regularizer) = &mut self.regularizer else { return Ok(()) };
         regularizer.search(self.headless, &self.parameters, step)?;
-        submit(self.headless, "gs4d terms", |pass| regularizer.record(pass, self.parameters.count()));
+        submit(self.headless, "gs4d terms", |pass| regularizer.record(pass, &self.parameters));
         Ok(())
     }
 
@@ -351,16 +354,15 @@ impl<'a> Trainer<'a> {
         if self.scene.model() != Some(Model::Rotated4d) {
             return Err(TrainerError::Model);
         }
-        let Some([gaussians, ..]) = self.capture.writable() else { return Err(TrainerError::Empty) };
-        self.grower = Some(Grower::new(self.headless, &self.parameters, gaussians)?);
+        self.grower = Some(Grower::new(self.headless, &self.parameters)?);
         Ok(())
     }
 
     /// Hides a share of the Gaussians, drawn with this seed, until the next step is made; 0 unless the scene [grows](Self::set_growing).
     pub fn drop_out(&mut self, share: f64, seed: u32) {
         if let Some(grower) = self.grower.as_ref().filter(|_| share > 0.0) {
-            let (queue, count) = (&self.headless.context().queue, self.parameters.count());
-            submit(self.headless, "gs4d dropout", |pass| grower.record_dropout(queue, pass, count, seed, share));
+            let (queue, parameters) = (&self.headless.context().queue, &self.parameters);
+            submit(self.headless, "gs4d dropout", |pass| grower.record_dropout(queue, pass, parameters, seed, share));
         }
     }
 
@@ -449,20 +451,22 @@ impl<'a> Trainer<'a> {
         growth: Option<StepGrowth>,
     ) -> Result<(), GpuError> {
         let Self { headless, passes, parameters, environment, exposure, tied, sparse, .. } = &*self;
-        let ParameterBuffers { geometry, color, .. } = parameters;
+        let ParameterBuffers { geometry, parts, .. } = parameters;
         let colors = rates.of_harmonics(factor);
         let spatial_lr_scale = self.scene.trained_with.spatial_lr_scale;
         let geometry_rates = rates.of_parameters(spatial_lr_scale, factor);
         let all = Extent { sparse: *sparse, values: None };
         let of_color = Extent { values: growth.map(|growth| growth.color_values), ..all };
         let mut rated = vec![(geometry, geometry_rates, all)];
+        let of_parts = parts.iter().map(|part| &part.color);
         match tied {
             // The first coefficient of each Gaussian is its own; entries are of many.
-            Some(tied) => rated.extend([
-                (color, Rates { harmonics: 0.0, ..*rates }.of_harmonics(factor), all),
-                (&tied.entries, [colors[1]; 5], Extent { sparse: false, ..all }),
-            ]),
-            None => rated.push((color, colors, of_color)),
+            Some(tied) => {
+                let own = Rates { harmonics: 0.0, ..*rates }.of_harmonics(factor);
+                rated.extend(of_parts.map(|color| (color, own, all)));
+                rated.push((&tied.entries, [colors[1]; 5], Extent { sparse: false, ..all }));
+            }
+            None => rated.extend(of_parts.map(|color| (color, colors, of_color))),
         }
         let queue = &headless.context().queue;
         let mut encoder = encoder(headless, "gs4d step");
@@ -491,7 +495,7 @@ impl<'a> Trainer<'a> {
                 cloner.record(&mut pass, parameters.count());
             }
             if let Some(tied) = tied {
-                tied.record_expand(&mut pass, passes, color);
+                tied.record_expand(&mut pass, passes, parameters);
             }
             self.record_slice(&mut pass);
         }
@@ -573,10 +577,7 @@ impl<'a> Trainer<'a> {
         let changes = changes(&parameters, &self.scene.trained_with, bits)?;
         let rounder = match self.rounder.take() {
             Some(rounder) => rounder,
-            None => {
-                let Some([gaussians, lifespans, _]) = self.capture.writable() else { return Err(TrainerError::Empty) };
-                Rounder::new(self.headless, &self.parameters, [gaussians, lifespans])?
-            }
+            None => Rounder::new(self.headless, &self.parameters)?,
         };
         rounder.write(&self.headless.context().queue, &changes);
         self.rounder = Some(rounder);
@@ -589,8 +590,8 @@ impl<'a> Trainer<'a> {
     /// # Errors
     /// A lost device.
     pub fn scene(&self) -> Result<GaussianScene, GpuError> {
-        let ParameterBuffers { geometry, color, .. } = &self.parameters;
-        let (records, values) = (geometry.read_values(self.headless)?, color.read_values(self.headless)?);
+        let records = self.parameters.geometry.read_values(self.headless)?;
+        let values = self.parameters.read_colors(self.headless)?;
         let texels = self.environment.as_ref().map(|map| map.texels(self.headless)).transpose()?;
         Ok(self.with(&records, &values, texels))
     }
@@ -600,8 +601,8 @@ impl<'a> Trainer<'a> {
     /// # Errors
     /// A lost device.
     pub fn gradients(&self) -> Result<GaussianScene, GpuError> {
-        let ParameterBuffers { geometry, color, .. } = &self.parameters;
-        let (records, values) = (geometry.read_gradients(self.headless)?, color.read_gradients(self.headless)?);
+        let records = self.parameters.geometry.read_gradients(self.headless)?;
+        let values = self.parameters.read_color_gradients(self.headless)?;
         let texels = self.environment.as_ref().map(|map| map.gradients(self.headless)).transpose()?;
         let mut gradients = self.with(&records, &values, texels);
         if let SceneForm::Trained(Trained { harmonics, .. }) = &mut gradients.form {
@@ -621,7 +622,7 @@ impl<'a> Trainer<'a> {
         if let SceneForm::Trained(Trained { parameters, harmonics }) = &mut scene.form {
             let records: Vec<TrainedRecord> = bytemuck::pod_collect_to_vec(records);
             set_parameters(parameters, &records);
-            let stride = self.parameters.color.stride as usize * 4;
+            let stride = self.parameters.stride() as usize * 4;
             set_harmonics(harmonics, &bytemuck::pod_collect_to_vec::<u8, f32>(values), stride);
         }
         scene
@@ -668,11 +669,12 @@ impl<'a> Trainer<'a> {
 
     /// Returns the buffers of a state, in its order.
     fn stored(&self) -> Vec<&wgpu::Buffer> {
-        let ParameterBuffers { geometry, color, .. } = &self.parameters;
+        let ParameterBuffers { geometry, parts, .. } = &self.parameters;
         let environment = self.environment.as_ref().map(|environment| &environment.values);
         let exposure = self.exposure.as_ref().map(|exposure| &exposure.values);
-        let all = [Some(geometry), Some(color), environment, exposure, self.tied.as_ref().map(|tied| &tied.entries)];
-        let optimized = all.into_iter().flatten().flat_map(Optimized::stored);
+        let gaussians = iter::once(geometry).chain(parts.iter().map(|part| &part.color));
+        let others = [environment, exposure, self.tied.as_ref().map(|tied| &tied.entries)];
+        let optimized = gaussians.chain(others.into_iter().flatten()).flat_map(Optimized::stored);
         let others = [
             self.rounder.as_ref().map(|rounder| &rounder.changes),
             self.cloner.as_ref().map(|cloner| &cloner.statistics),
@@ -684,7 +686,7 @@ impl<'a> Trainer<'a> {
     pub fn forget_moments(&mut self) {
         let mut encoder = encoder(self.headless, "gs4d moments");
         self.parameters.geometry.forget_moments(&mut encoder);
-        self.parameters.color.forget_moments(&mut encoder);
+        self.parameters.parts.iter().for_each(|part| part.color.forget_moments(&mut encoder));
         if let Some(environment) = &self.environment {
             environment.values.forget_moments(&mut encoder);
         }
@@ -697,8 +699,7 @@ impl<'a> Trainer<'a> {
     /// Computes the coefficients from the entries of codebooks, if colors are tied.
     fn expand(&self) {
         if let Some(tied) = &self.tied {
-            let color = &self.parameters.color;
-            submit(self.headless, "gs4d expand", |pass| tied.record_expand(pass, &self.passes, color));
+            submit(self.headless, "gs4d expand", |pass| tied.record_expand(pass, &self.passes, &self.parameters));
         }
     }
 
@@ -712,30 +713,8 @@ impl<'a> Trainer<'a> {
     fn record_slice(&self, pass: &mut wgpu::ComputePass<'_>) {
         self.parameters.record_slice(pass, &self.passes);
         if let Some(rounder) = &self.rounder {
-            rounder.record(pass, self.parameters.count().div_ceil(256));
+            rounder.record(pass, &self.parameters);
         }
-    }
-}
-
-/// Returns the four-vectors of the color of each Gaussian with these degrees.
-fn stride(degree: u32, degree_t: u32) -> u32 {
-    (evaluated(degree, degree_t) * 3).div_ceil(4) as u32
-}
-
-/// Checks that the device binds so many Gaussians with colors of these degrees, before there are any.
-///
-/// # Errors
-/// The bytes that are needed, and the limit of the device.
-pub fn require_room(headless: &Headless, count: usize, degree: u32, degree_t: u32) -> Result<(), GpuError> {
-    require_gaussians(headless, count as u64, stride(degree, degree_t))
-}
-
-fn require_gaussians(headless: &Headless, count: u64, stride: u32) -> Result<(), GpuError> {
-    let limit = binding_limit(&headless.context().device.limits());
-    let needed = count.saturating_mul(16 * u64::from(stride.max(5)));
-    match needed > limit {
-        true => Err(GpuError::TooLarge { what: "the Gaussians that are trained", needed, limit }),
-        false => Ok(()),
     }
 }
 

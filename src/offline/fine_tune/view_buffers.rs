@@ -2,12 +2,13 @@
 //!
 //! In: the frame that was recorded last. Out: [`ViewBuffers`]; commands of the passes after the picture.
 
+use super::optimized::across_and_down;
 use super::parameters::ParameterBuffers;
 use super::passes::Passes;
 use super::sample::GpuImage;
 use super::sums::GradientSums;
 use crate::offline::layout::LossUniforms;
-use crate::renderer::layout::InstanceUniforms;
+use crate::renderer::layout::{INSTANCE_STRIDE, InstanceUniforms};
 use crate::renderer::memory::binding_limit;
 use crate::renderer::{FinishedFrame, GpuCapture, GpuError, Headless};
 use crate::view::tiles;
@@ -52,7 +53,8 @@ pub(super) struct ViewBuffers {
     loss: wgpu::BindGroup,
     blended: wgpu::BindGroup,
     sums: wgpu::BindGroup,
-    splat_gradients: wgpu::BindGroup,
+    /// For each part.
+    splat_gradients: Vec<wgpu::BindGroup>,
 }
 
 impl ViewBuffers {
@@ -109,14 +111,16 @@ impl ViewBuffers {
         let depth = wgpu::BindingResource::TextureView(frame.depth);
         let blended = [read.map(whole).to_vec(), vec![color, depth]].concat();
         let sums = [&first_pairs, &gradients, &pixel_gradients, &depth_gradients].map(whole);
-        let instance = wgpu::BindingResource::Buffer(wgpu::BufferBinding {
-            buffer: frame.instances,
-            offset: 0,
-            size: std::num::NonZeroU64::new(size_of::<InstanceUniforms>() as u64),
+        let splat_gradients = (0u64..).zip(&parameters.parts).map(|(index, part)| {
+            let instance = wgpu::BindingResource::Buffer(wgpu::BufferBinding {
+                buffer: frame.instances,
+                offset: index * u64::from(INSTANCE_STRIDE),
+                size: std::num::NonZeroU64::new(size_of::<InstanceUniforms>() as u64),
+            });
+            let splats =
+                [&part.scene_settings, &buffers.splats, &buffers.depth_keys, &first_pairs, &gradients].map(whole);
+            allocator.bind_group("gs4d splats", &passes.splats_group, &[vec![instance], splats.to_vec()].concat())
         });
-        let splats =
-            [&parameters.scene_settings, &buffers.splats, &buffers.depth_keys, &first_pairs, &gradients].map(whole);
-        let splat_gradients = [vec![instance], splats.to_vec()].concat();
         let of_loss = [&loss_settings, &slopes, &pixel_gradients, &tile_sums, totals];
         Ok(Self {
             splats: buffers.splats.clone(),
@@ -126,7 +130,7 @@ impl ViewBuffers {
             loss: bind_loss(headless, passes, of_loss, frame.color),
             blended: allocator.bind_group("gs4d blended", &passes.blended_group, &blended),
             sums: allocator.bind_group("gs4d sums", &passes.sums_group, &sums),
-            splat_gradients: allocator.bind_group("gs4d splats", &passes.splats_group, &splat_gradients),
+            splat_gradients: splat_gradients.collect(),
             loss_settings,
             slopes,
             pixel_gradients,
@@ -202,11 +206,14 @@ impl ViewBuffers {
         pass.set_pipeline(&passes.pairs);
         pass.dispatch_workgroups(tiles.x, tiles.y, 1);
         pass.set_pipeline(&passes.project_backward);
-        pass.set_bind_group(0, &self.splat_gradients, &[]);
-        pass.set_bind_group(1, capture.geometry(), &[]);
-        pass.set_bind_group(2, headless.recorded_list(), &[]);
-        pass.set_bind_group(3, &parameters.group, &[]);
-        pass.dispatch_workgroups(parameters.count().div_ceil(64), 1, 1);
+        for ((part, splats), geometry) in parameters.parts.iter().zip(&self.splat_gradients).zip(capture.geometry()) {
+            pass.set_bind_group(0, splats, &[]);
+            pass.set_bind_group(1, geometry, &[]);
+            pass.set_bind_group(2, headless.recorded_list(), &[]);
+            pass.set_bind_group(3, &part.group, &[]);
+            let [across, down] = across_and_down(part.count().div_ceil(64));
+            pass.dispatch_workgroups(across, down, 1);
+        }
     }
 }
 

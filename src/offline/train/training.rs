@@ -54,7 +54,7 @@ impl TrainSettings {
     }
 
     /// Returns the most Gaussians that there are at any step.
-    pub(crate) fn capacity(&self) -> usize {
+    fn capacity(&self) -> usize {
         let cloning = self.tuning.growth.and_then(|growth| growth.cloning);
         cloning.map_or(self.start.gaussians, |cloning| cloning.capacity.max(self.start.gaussians))
     }

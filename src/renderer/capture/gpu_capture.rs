@@ -251,13 +251,14 @@ impl GpuCapture {
         self.bytes + self.filter.as_ref().map_or(0, |filter| filter.bytes)
     }
 
-    /// Returns the buffers of records, lifespans and color coefficients, for passes of clients that write them. Returns `None` if the capture
-    /// is packed or has several parts.
-    pub fn writable(&self) -> Option<[&wgpu::Buffer; 3]> {
-        match (&self.parts[..], self.storage) {
-            ([Part { buffers, .. }], Storage::Sliced) => buffers.iter().collect::<Vec<_>>().try_into().ok(),
-            _ => None,
-        }
+    /// Returns for each part its number of Gaussians and its buffers of records, lifespans and color coefficients, for passes of clients that
+    /// write them. Returns nothing if the capture is packed.
+    pub fn writable(&self) -> impl Iterator<Item = (u32, [&wgpu::Buffer; 3])> {
+        let parts = if self.storage == Storage::Sliced { &self.parts[..] } else { &[] };
+        parts.iter().filter_map(|part| {
+            let buffers = part.buffers.iter().collect::<Vec<_>>().try_into().ok()?;
+            Some((part.count, buffers))
+        })
     }
 
     /// Returns the buffer of the texels of the environment map, planar, for passes of clients that write them. Returns `None` if the capture
@@ -266,9 +267,9 @@ impl GpuCapture {
         self.environment.as_ref().map(|map| &map.buffer)
     }
 
-    /// Returns the bind group of the geometry, for passes of clients. Returns `None` if the capture has several parts.
-    pub fn geometry(&self) -> Option<&wgpu::BindGroup> {
-        if let [part] = &self.parts[..] { Some(&part.geometry) } else { None }
+    /// Returns the bind group of the geometry of each part, for passes of clients.
+    pub fn geometry(&self) -> impl Iterator<Item = &wgpu::BindGroup> {
+        self.parts.iter().map(|part| &part.geometry)
     }
 
     /// Returns `view` with the color and time settings of the capture.

@@ -7,7 +7,8 @@
 pub struct FinishedFrame<'a> {
     /// Uniform buffer: one [`FrameUniforms`](crate::renderer::layout::FrameUniforms).
     pub frame: &'a wgpu::Buffer,
-    /// Uniform buffer: begins with one [`InstanceUniforms`](crate::renderer::layout::InstanceUniforms), of the first part of the first instance.
+    /// Uniform buffer: one [`InstanceUniforms`](crate::renderer::layout::InstanceUniforms) for each part of the first instance, then of the
+    /// others, each at a multiple of [`INSTANCE_STRIDE`](crate::renderer::layout::INSTANCE_STRIDE).
     pub instances: &'a wgpu::Buffer,
     /// Storage buffer: one [`Counters`](crate::renderer::layout::Counters).
     pub counters: &'a wgpu::Buffer,
