@@ -186,6 +186,10 @@ pub mod offline {
         pub mod drawing {
             pub use crate::offline::dataset::drawing::*;
         }
+        /// Points to begin a training with.
+        pub mod point_cloud {
+            pub use crate::offline::dataset::point_cloud::*;
+        }
         /// Descriptions of folders.
         pub mod summary {
             pub use crate::offline::dataset::summary::*;

@@ -18,6 +18,7 @@ use crate::offline::fine_tune::{Cloning, FineTuneSettings, FineTuned, Growth, Ra
 use crate::offline::store::Store;
 use crate::offline::train::{CaptureSettings, Start, StartSettings, TrainSettings, TrainedCapture, Training};
 use serde_json::json;
+use std::path::PathBuf;
 
 /// Train a capture from nothing but the pictures of a dataset.
 ///
@@ -54,10 +55,14 @@ pub(super) struct Train {
     /// Number of Gaussians; with --densify original the most that there are at any step.
     #[arg(long, value_name = "N", default_value = "60000", value_parser = values::count(100_000_000))]
     gaussians: usize,
-    /// Where Gaussians begin: hull, inside the silhouettes of the images, random, in the box that the cameras look at, or auto: the first
-    /// that the images allow.
+    /// Where Gaussians begin: hull, inside the silhouettes of the images; points, at those of the dataset (`points3D` of COLMAP, `ply_file_path` of
+    /// `transforms.json`, `points3d.ply` beside `transforms_train.json`); random, in the box that the cameras look at; or auto: the first of these
+    /// that the dataset allows.
     #[arg(long, value_name = "WHERE", default_value = "auto", value_parser = values::one_of(&Start::NAMES))]
     start: Start,
+    /// Begin with the points of FILE: PLY, `points3D.bin` or `points3D.txt`, in the space of the cameras.
+    #[arg(long, value_name = "FILE")]
+    points: Option<PathBuf>,
     /// Temporal scale of Gaussians at the beginning, as a share of the time interval [default: 0.1, at least the step between two moments
     /// of the images; the original's is 0.447 of an interval of 1].
     #[arg(long, value_name = "SHARE", value_parser = time_scale)]
@@ -147,7 +152,7 @@ impl Train {
     /// Views that cannot be used, a package that cannot be written, a failure of the GPU.
     pub(super) fn run(&self) -> Result<Report, Failure> {
         self.check_options()?;
-        let out = self.package.checked_file(self.data.add_to(Files::default()))?;
+        let out = self.package.checked_file(self.data.add_to(Files::default()).reads(&self.points))?;
         let store = Store::beside(out, ".train")?;
         let progress = &mut Bars::default();
         let settings = self.settings();
@@ -220,6 +225,9 @@ impl Train {
             let reason = "with --densify original: places without a Gaussian would be neighbors";
             self.given.none_of(&["--rigid-weight"], reason)?;
         }
+        if matches!(self.start, Start::Hull | Start::Random) {
+            self.given.none_of(&["--points"], &format!("with --start {}", self.start.name()))?;
+        }
         match self.sh_degree < 3 {
             true => self.given.none_of(&["--sh-degree-t"], WITHOUT_TIME),
             false => Ok(()),
@@ -232,7 +240,7 @@ impl Train {
                 Densify::Relocate => self.gaussians,
                 Densify::Original => Cloning::first(self.gaussians),
             },
-            start: self.start,
+            start: if self.points.is_some() { Start::Points } else { self.start },
             time_scale: self.time_scale,
             seed: self.training.seed,
             degree: self.sh_degree,
@@ -247,6 +255,7 @@ impl Train {
             splits: self.data.options(self.validation),
             capture: CaptureSettings { time_interval: self.time_interval, background: self.background },
             start: self.start_settings(),
+            points: self.points.clone(),
             tuning: self.tuning(),
             save_every: self.save_every,
         }

@@ -48,6 +48,8 @@ pub struct Splits {
     pub by: Validation,
     /// Views held out, measured or not.
     pub held_out: usize,
+    /// File of points to begin training with, if the dataset names or has one. It may not exist.
+    pub points: Option<PathBuf>,
     folder: PathBuf,
     options: SplitOptions,
 }
@@ -63,7 +65,7 @@ impl Splits {
         trained_with: &TrainedWith,
         progress: &mut dyn Progress,
     ) -> Result<Self, OfflineError> {
-        let views = open_split(folder, Split::Train, options, trained_with, progress)?.views;
+        let Dataset { views, points, .. } = open_split(folder, Split::Train, options, trained_with, progress)?;
         let HeldOut { train, validation, by } = match Self::of_file(folder, options, trained_with, progress)? {
             Some(validation) => HeldOut { train: views, validation, by: Validation::File },
             None => hold_out(&views, options.validation).ok_or_else(|| {
@@ -77,7 +79,7 @@ impl Splits {
         };
         let held_out = validation.len();
         let validation = subset(validation, Some(MEASURED));
-        Ok(Self { train, validation, by, held_out, folder: folder.to_owned(), options: *options })
+        Ok(Self { train, validation, by, held_out, points, folder: folder.to_owned(), options: *options })
     }
 
     /// Returns the views of `transforms_val.json` if they are to be used: the file is there with its images, is wanted,

@@ -51,6 +51,34 @@ fn a_capture_is_trained_from_the_pictures_of_a_dataset() {
 }
 
 #[test]
+fn points_of_the_dataset_or_of_a_file_are_what_training_begins_with() {
+    let Some(capture) = dataset() else { return };
+    let out = capture.path("out.gs4d");
+    let run = |more: &[&str]| {
+        let command = arguments!["train", "--data", &capture.data, "-o", &out, "--gaussians", "50", "--sh-degree", "0"];
+        let more = ["--steps", "2", "--validation", "none", "--json"].iter().chain(more).map(Into::into).collect();
+        gs4d(&[command.to_vec(), more].concat())
+    };
+    run(&["--start", "points"]).must_fail("the dataset has no file of points");
+    let beside = capture.data.join("points3d.ply");
+    let header =
+        "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
+    fs::write(&beside, format!("{header}0 0 0\n0.1 0 0\n")).expect("the folder can be written to");
+    assert_eq!(run(&[]).json()["start"].as_str(), Some("points"), "points before random places");
+    assert_eq!(run(&["--start", "random"]).json()["start"].as_str(), Some("random"), "as asked");
+    let given = capture.path("points3D.txt");
+    fs::write(&given, "1 0 0 0 255 0 0 0.5\n").expect("the folder can be written to");
+    let points = given.to_str().expect("a path in UTF-8");
+    let red = run(&["--points", points]);
+    assert_eq!(red.json()["start"].as_str(), Some("points"), "the file that is given");
+    run(&["--points", points, "--start", "hull"]).must_fail("--points has no effect with --start hull");
+    fs::write(&given, "").expect("the folder can be written to");
+    run(&["--points", points]).must_fail("points3D.txt: has no points with finite places");
+    fs::write(&beside, "ply\n").expect("the folder can be written to");
+    run(&[]).must_fail("points3d.ply");
+}
+
+#[test]
 fn exposures_are_reported_and_not_stored() {
     let Some(capture) = dataset() else { return };
     let out = capture.path("out.gs4d");

@@ -414,7 +414,7 @@ impl Lesson {
         let images =
             TrainingImages::load(views.clone(), validation, &trained_with, ImageRoom::of_system(), &mut NoProgress);
         let images = images.expect("the images were just written");
-        let (scene, _) = begin(&images, trained_with, playback, start).expect("the cameras look at the blobs");
+        let (scene, _) = begin(&images, trained_with, playback, start, None).expect("the cameras look at the blobs");
         let resume = store.map(|store| Resume { store, key: Key::of(b"blobs"), every: 1 });
         train(headless, scene, &images, settings, resume, out, progress).map_err(Box::new)
     }

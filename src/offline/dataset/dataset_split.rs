@@ -8,6 +8,7 @@ use super::division::divide;
 use super::error::DatasetError;
 use super::files::require_files;
 use super::format::{self, Format, Reader};
+use super::point_cloud::BESIDE;
 use super::split::Split;
 use super::video::Videos;
 use super::view::TrainingView;
@@ -22,7 +23,7 @@ pub struct Dataset {
     pub split: Split,
     /// The views of the split in file order, at least one.
     pub views: Vec<TrainingView>,
-    /// File of points to begin training with, if the dataset names one. It may not exist.
+    /// File of points to begin training with, if the dataset names or has one. It may not exist.
     pub points: Option<PathBuf>,
 }
 
@@ -63,7 +64,8 @@ impl Dataset {
         if !path.is_file() {
             return Err(DatasetError::NoSplit { folder: folder.to_owned(), file: split.file_name() });
         }
-        Ok(Self { folder: folder.to_owned(), split, views: CameraFile::load(&path, options)?, points: None })
+        let points = Some(folder.join(BESIDE)).filter(|points| points.is_file());
+        Ok(Self { folder: folder.to_owned(), split, views: CameraFile::load(&path, options)?, points })
     }
 
     /// Returns whether a folder has views of a split.

@@ -33,6 +33,7 @@ mod n3v;
 mod nerfstudio;
 mod npy;
 mod numbered;
+pub(crate) mod point_cloud;
 mod pose;
 mod resample;
 pub(crate) mod selection;

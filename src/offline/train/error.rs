@@ -24,6 +24,12 @@ pub enum StartError {
         "the training cameras look away from each other, so that they have no region in common: give views of one scene"
     )]
     NoRegion,
+    /// There are no points.
+    #[error(
+        "the dataset has no file of points (points3d.ply, sparse/0/points3D.bin, ply_file_path of transforms.json): give one with --points, or another \
+         --start"
+    )]
+    NoPoints,
     /// There are no silhouettes.
     #[error("the images have no transparent pixels and no masks, so that they have no hull: give --start random")]
     NoSilhouettes,

@@ -1,7 +1,7 @@
 //! The Gaussians before the first step.
 //!
-//! In: training images, [`StartSettings`]. Out: a scene of native 4D Gaussians at points of the visual hull, or at random ones in the box
-//! that the cameras look at; an environment map behind them on request.
+//! In: training images, points if there are any, [`StartSettings`]. Out: a scene of native 4D Gaussians at these points, at points of the visual hull,
+//! or at random ones in the box that the cameras look at; an environment map behind them on request.
 //!
 //! Opacity is 0.1; the spatial scale is the root of the mean squared distance to the three nearest points; the temporal scale is a share of
 //! the interval; no Gaussian is rotated or moves (section 5.4 of the 4DGS model).
@@ -14,6 +14,7 @@ use super::surroundings::surroundings;
 use crate::gaussian::harmonics::evaluated;
 use crate::gaussian::{Harmonics, Parameters};
 use crate::offline::dataset::CoveredImage;
+use crate::offline::dataset::point_cloud::PointCloud;
 use crate::offline::fine_tune::TrainingImages;
 use crate::offline::fine_tune::neighbors::{NEIGHBORS, neighbors};
 use crate::scene::random::Random;
@@ -41,9 +42,11 @@ const FILLING: f32 = 0.02;
 /// Where the points come from. Default: [`Auto`](Self::Auto).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Start {
-    /// From the visual hull if most images have silhouettes and it is not empty, else at random.
+    /// From the visual hull if most images have silhouettes and it is not empty, else from the points of the dataset if it has some, else at random.
     #[default]
     Auto,
+    /// From points that were measured: of the dataset, or of a file beside it.
+    Points,
     /// From the visual hull of the silhouettes.
     Hull,
     /// At random in the box that the cameras look at.
@@ -52,7 +55,8 @@ pub enum Start {
 
 impl Start {
     /// Every start with its name.
-    pub const NAMES: [(&'static str, Self); 3] = [("auto", Self::Auto), ("hull", Self::Hull), ("random", Self::Random)];
+    pub const NAMES: [(&'static str, Self); 4] =
+        [("auto", Self::Auto), ("points", Self::Points), ("hull", Self::Hull), ("random", Self::Random)];
 
     /// Returns the name.
     pub fn name(self) -> &'static str {
@@ -94,24 +98,25 @@ impl Default for StartSettings {
     }
 }
 
-/// Returns the scene before the first step, and where its points come from: the hull, or random places.
+/// Returns the scene before the first step, and where its points come from: `cloud`, the hull, or random places.
 ///
 /// # Errors
-/// Cameras without a common region; a visual hull that was asked for and is empty; an environment map that was asked for and that images with
-/// transparent pixels do not show.
+/// Cameras without a common region, unless points are given; points that were asked for and are not given; a visual hull that was asked for and is
+/// empty; an environment map that was asked for and that images with transparent pixels do not show.
 pub fn begin(
     images: &TrainingImages,
     trained_with: TrainedWith,
     playback: PlaybackHints,
     settings: &StartSettings,
+    cloud: Option<&PointCloud>,
 ) -> Result<(GaussianScene, Start), StartError> {
     let pairs: Vec<(&View, &CoveredImage)> = images.first().collect();
     let rows = settings.environment;
     if rows > 0 && images.has_gaps() {
         return Err(StartError::NoSurroundings);
     }
-    let region = Region::of(images.all_views())?;
-    let (points, start) = points(&pairs, &region, trained_with.time_interval, settings)?;
+    let region = Region::of(images.all_views());
+    let (points, start) = points(&pairs, region, trained_with.time_interval, settings, cloud)?;
     let (span, background) = (trained_with.time_span(), trained_with.background);
     let usual = || usual_time_scale(images.all_views().map(|view| view.time).collect());
     let scale_t = settings.time_scale.unwrap_or_else(usual) as f32 * span;
@@ -137,28 +142,34 @@ fn usual_time_scale(mut times: Vec<f32>) -> f64 {
 
 fn points(
     images: &[(&View, &CoveredImage)],
-    region: &Region,
+    region: Result<Region, StartError>,
     interval: [f32; 2],
     settings: &StartSettings,
+    cloud: Option<&PointCloud>,
 ) -> Result<(Vec<StartPoint>, Start), StartError> {
     let count = settings.gaussians;
     let mut random = Random::new(settings.seed);
+    if settings.start == Start::Points {
+        let cloud = cloud.ok_or(StartError::NoPoints)?;
+        return Ok((measured(cloud, interval, count, &mut random), Start::Points));
+    }
     let with_gaps = images.iter().filter(|(_, image)| image.has_gaps).count();
     let wants_hull = match settings.start {
         Start::Hull => true,
-        Start::Random => false,
+        Start::Points | Start::Random => false,
         Start::Auto => 2 * with_gaps > images.len(),
     };
     if wants_hull {
         if with_gaps == 0 {
             return Err(StartError::NoSilhouettes);
         }
+        let region = region.as_ref().map_err(StartError::clone)?;
         let mut found = hull(images, region, interval, count, settings.seed);
         if !found.is_empty() {
             // A hull of fewer points is filled with points beside these.
             let own = found.len();
             for index in own..count {
-                let beside = Vec3::from([(); 3].map(|()| random.in_range(-1.0, 1.0))) * FILLING * region.half;
+                let beside = in_cube(&mut random) * FILLING * region.half;
                 let point = found[index % own];
                 found.push(StartPoint { position: point.position + beside, ..point });
             }
@@ -168,29 +179,73 @@ fn points(
             return Err(StartError::NoHull);
         }
     }
-    let span = interval[1] - interval[0];
+    if let Some(cloud) = cloud.filter(|_| settings.start == Start::Auto) {
+        return Ok((measured(cloud, interval, count, &mut random), Start::Points));
+    }
+    let region = region?;
     let mut point = || StartPoint {
-        position: region.center + region.half * Vec3::from([(); 3].map(|()| random.in_range(-1.0, 1.0))),
-        time: interval[0] + span * random.in_range(-OUTSIDE, 1.0 + OUTSIDE),
+        position: region.center + region.half * in_cube(&mut random),
+        time: any_time(interval, &mut random),
         color: Vec3::splat(GRAY),
     };
     Ok(((0..count).map(|_| point()).collect(), Start::Random))
 }
 
+/// Returns a place in the cube from −1 to 1.
+fn in_cube(random: &mut Random) -> Vec3 {
+    Vec3::from([(); 3].map(|()| random.in_range(-1.0, 1.0)))
+}
+
+/// Returns a time of the interval, or a little outside.
+fn any_time(interval: [f32; 2], random: &mut Random) -> f32 {
+    interval[0] + (interval[1] - interval[0]) * random.in_range(-OUTSIDE, 1.0 + OUTSIDE)
+}
+
+/// Returns so many of these points: some of them if there are more, and further ones beside them if there are fewer. Points without times have
+/// any.
+fn measured(cloud: &PointCloud, interval: [f32; 2], count: usize, random: &mut Random) -> Vec<StartPoint> {
+    let PointCloud(own) = cloud;
+    let point = |index: usize, beside: Vec3, random: &mut Random| StartPoint {
+        position: own[index].position + beside,
+        time: own[index].time.unwrap_or_else(|| any_time(interval, random)),
+        color: own[index].color.unwrap_or(Vec3::splat(GRAY)),
+    };
+    if own.len() > count {
+        // The first of a random order (Fisher and Yates).
+        let mut order: Vec<usize> = (0..own.len()).collect();
+        for index in 0..count {
+            let other = index + ((random.unit() * (own.len() - index) as f32) as usize).min(own.len() - index - 1);
+            order.swap(index, other);
+        }
+        return order[..count].iter().map(|&index| point(index, Vec3::ZERO, random)).collect();
+    }
+    let places: Vec<[f32; 3]> = own.iter().map(|point| point.position.to_array()).collect();
+    let distances: Vec<f32> = squares(&places).into_iter().map(f32::sqrt).collect();
+    let further = |index: usize| {
+        let beside = if index < own.len() { Vec3::ZERO } else { distances[index % own.len()] * in_cube(random) };
+        point(index % own.len(), beside, random)
+    };
+    (0..count).map(further).collect()
+}
+
+/// Returns for each place the mean squared distance to the nearest others, at least the least.
+fn squares(places: &[[f32; 3]]) -> Vec<f32> {
+    let near = neighbors(places);
+    let square = |(index, own): (usize, &[u32])| {
+        let square = |&other: &u32| Vec3::from(places[index]).distance_squared(Vec3::from(places[other as usize]));
+        (own[1..=NEAREST].iter().map(square).sum::<f32>() / NEAREST as f32).max(LEAST_SQUARE)
+    };
+    near.chunks_exact(NEIGHBORS).enumerate().map(square).collect()
+}
+
 /// Returns Gaussians at these points, with this temporal scale.
 fn trained(points: &[StartPoint], scale_t: f32, degree: u32, degree_t: u32) -> Trained {
     let mean: Vec<[f32; 3]> = points.iter().map(|point| point.position.to_array()).collect();
-    let near = neighbors(&mean);
-    let log_scale = |(index, own): (usize, &[u32])| {
-        let square = |&other: &u32| points[index].position.distance_squared(points[other as usize].position);
-        let mean = own[1..=NEAREST].iter().map(square).sum::<f32>() / NEAREST as f32;
-        [0.5 * mean.max(LEAST_SQUARE).ln(); 3]
-    };
     let count = points.len();
     let unrotated = vec![[1.0, 0.0, 0.0, 0.0]; count];
     let parameters = Parameters {
         mean_t: points.iter().map(|point| point.time).collect(),
-        log_scale: near.chunks_exact(NEIGHBORS).enumerate().map(log_scale).collect(),
+        log_scale: squares(&mean).into_iter().map(|square| [0.5 * square.ln(); 3]).collect(),
         log_scale_t: vec![scale_t.ln(); count],
         rotation_l: unrotated.clone(),
         rotation_r: unrotated,
@@ -208,6 +263,7 @@ fn trained(points: &[StartPoint], scale_t: f32, degree: u32, degree_t: u32) -> T
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::offline::dataset::point_cloud::CloudPoint;
     use crate::view::{Camera, RasterFov};
     use glam::UVec2;
 
@@ -227,11 +283,22 @@ mod tests {
         (0..5).map(view).collect()
     }
 
-    fn start(coverage: u8, start: Start) -> Result<(Vec<StartPoint>, Start), StartError> {
+    fn start(coverage: u8, start: Start, cloud: Option<&PointCloud>) -> Result<(Vec<StartPoint>, Start), StartError> {
         let views = views(coverage);
         let images: Vec<_> = views.iter().map(|(view, image)| (view, image)).collect();
-        let region = Region::of(images.iter().map(|(view, _)| *view)).expect("a region");
-        points(&images, &region, [0.0, 0.8], &StartSettings { gaussians: 700, start, ..StartSettings::default() })
+        let region = Region::of(images.iter().map(|(view, _)| *view));
+        let settings = StartSettings { gaussians: 700, start, ..StartSettings::default() };
+        points(&images, region, [0.0, 0.8], &settings, cloud)
+    }
+
+    /// Returns so many points on a line, of one color, at times from 0.2.
+    fn cloud(count: usize) -> PointCloud {
+        let point = |index: usize| CloudPoint {
+            position: Vec3::X * index as f32,
+            color: Some(Vec3::Y),
+            time: (index > 0).then_some(0.2 + 1e-4 * index as f32),
+        };
+        PointCloud((0..count).map(point).collect())
     }
 
     #[test]
@@ -243,16 +310,50 @@ mod tests {
 
     #[test]
     fn the_start_is_chosen_by_the_images() {
-        let found = |coverage, wanted| start(coverage, wanted).map(|(points, start)| (points.len(), start));
+        let found = |coverage, wanted| start(coverage, wanted, None).map(|(points, start)| (points.len(), start));
         assert_eq!(found(0, Start::Auto), Ok((700, Start::Hull)), "silhouettes");
         assert_eq!(found(255, Start::Auto), Ok((700, Start::Random)), "no silhouettes");
         assert_eq!(found(0, Start::Random), Ok((700, Start::Random)), "as asked");
         assert_eq!(found(255, Start::Hull), Err(StartError::NoSilhouettes), "a hull of nothing is refused");
+        assert_eq!(found(0, Start::Points), Err(StartError::NoPoints), "no points");
+        let cloud = cloud(9);
+        let found =
+            |coverage, wanted| start(coverage, wanted, Some(&cloud)).map(|(points, start)| (points.len(), start));
+        assert_eq!(found(0, Start::Auto), Ok((700, Start::Hull)), "silhouettes before points");
+        assert_eq!(found(255, Start::Auto), Ok((700, Start::Points)), "points before random places");
+        assert_eq!(found(0, Start::Points), Ok((700, Start::Points)), "as asked");
+    }
+
+    #[test]
+    fn points_that_are_given_keep_their_places_times_and_colors() {
+        for (given, own) in [(40, 40), (700, 700), (5000, 700)] {
+            let (found, _) = start(255, Start::Points, Some(&cloud(given))).expect("points are given");
+            assert_eq!(found.len(), 700, "{given} points: as many as wanted");
+            let whole = |point: &&StartPoint| point.position.x.fract() == 0.0 && point.position.y == 0.0;
+            let places: Vec<f32> = found.iter().filter(whole).map(|point| point.position.x).collect();
+            let mut unlike = places.clone();
+            unlike.sort_by(f32::total_cmp);
+            unlike.dedup();
+            assert_eq!((places.len(), unlike.len()), (own, own), "{given} points: each at most once in its place");
+            for point in &found {
+                let index = point.position.x.round().clamp(0.0, given as f32 - 1.0);
+                let beside = point.position.distance(Vec3::X * index);
+                // The nearest points of those at the ends are one, two and three units away.
+                assert!(beside <= 3f32.sqrt() * (14.0f32 / 3.0).sqrt(), "{given} points: beside its point: {beside}");
+                assert_eq!(point.color, Vec3::Y, "its color");
+                assert!((-0.08..0.88).contains(&point.time), "its time, or any of the interval: {}", point.time);
+            }
+            let timed = found.iter().filter(whole).filter(|point| point.position.x > 0.0);
+            let mut at_time = timed.map(|point| (point.time - 0.2 - 1e-4 * point.position.x).abs());
+            assert!(at_time.all(|error| error < 1e-5), "{given} points: the time of the file");
+        }
+        let alone = start(255, Start::Points, Some(&cloud(1))).expect("a point is given").0;
+        assert!(alone.iter().all(|point| point.position.length() < 1e-3), "all at the only point");
     }
 
     #[test]
     fn gaussians_begin_as_in_the_original() {
-        let (points, _) = start(255, Start::Auto).expect("random points");
+        let (points, _) = start(255, Start::Auto, None).expect("random points");
         let Trained { parameters, harmonics } = trained(&points, 0.4, 3, 2);
         let times = parameters.mean_t.iter().copied();
         let [first, last] = [times.clone().fold(f32::MAX, f32::min), times.fold(f32::MIN, f32::max)];

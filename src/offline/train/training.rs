@@ -6,6 +6,7 @@
 use super::capture::{CaptureSettings, capture_of};
 use super::start::{Start, StartSettings, begin};
 use super::train;
+use crate::offline::dataset::point_cloud::PointCloud;
 use crate::offline::dataset::{TrainingView, require_images};
 use crate::offline::fine_tune::{
     FineTuneSettings, FineTuned, Growth, ImageRoom, Rates, Resume, Terms, TrainingImages, require_room,
@@ -28,6 +29,8 @@ pub struct TrainSettings {
     pub capture: CaptureSettings,
     /// How the capture begins.
     pub start: StartSettings,
+    /// File of points to begin with; `None`: that of the dataset, if it has one.
+    pub points: Option<PathBuf>,
     /// How it is trained.
     pub tuning: FineTuneSettings,
     /// Steps between two saved states, rounded up to the next evaluation.
@@ -59,10 +62,37 @@ impl TrainSettings {
         cloning.map_or(self.start.gaussians, |cloning| cloning.capacity.max(self.start.gaussians))
     }
 
+    /// Reads the points to begin with, if any are given or named by the dataset, and hashes them. What the dataset names may be missing or empty
+    /// unless points are asked for.
+    fn cloud(
+        &self,
+        named: Option<&Path>,
+        progress: &mut dyn Progress,
+    ) -> Result<(Option<PointCloud>, Key), OfflineError> {
+        let none = (None, Key::of(b"no points"));
+        let path = match self.start.start {
+            Start::Auto | Start::Points => self.points.as_deref().or(named),
+            Start::Hull | Start::Random => None,
+        };
+        let Some(path) = path else { return Ok(none) };
+        let is_asked = self.start.start == Start::Points;
+        if !is_asked && !path.is_file() {
+            progress.note(&format!("note: {}: no such file of points, which the dataset names", path.display()));
+            return Ok(none);
+        }
+        match PointCloud::load(path)? {
+            PointCloud(points) if points.is_empty() && is_asked => {
+                Err(OfflineError::at(path, "has no points with finite places: give another file, or another --start"))
+            }
+            PointCloud(points) if points.is_empty() => Ok(none),
+            cloud => Ok((Some(cloud), Key::of_file(path)?)),
+        }
+    }
+
     /// Returns the usual settings for a dataset.
     pub fn usual(data: PathBuf, splits: SplitOptions) -> Self {
         let (capture, start) = (CaptureSettings::default(), StartSettings::default());
-        Self { data, splits, capture, start, tuning: Self::tuning(Self::STEPS), save_every: 5000 }
+        Self { data, splits, capture, start, points: None, tuning: Self::tuning(Self::STEPS), save_every: 5000 }
     }
 }
 
@@ -75,6 +105,8 @@ pub struct Training<'a> {
     views: Vec<TrainingView>,
     trained_with: TrainedWith,
     playback: PlaybackHints,
+    /// Points to begin with.
+    cloud: Option<PointCloud>,
     key: Key,
 }
 
@@ -94,10 +126,10 @@ pub struct TrainedCapture {
 }
 
 impl<'a> Training<'a> {
-    /// Reads the views of the dataset, divides them, and hashes their images.
+    /// Reads the views of the dataset, divides them, and hashes their images; reads the points to begin with.
     ///
     /// # Errors
-    /// Views or images that are missing or cannot be used.
+    /// Views, images or points that are missing or cannot be used.
     pub fn open(settings: &'a TrainSettings, progress: &mut dyn Progress) -> Result<Self, OfflineError> {
         let TrainSettings { data, splits: options, capture, start, tuning, .. } = settings;
         // Every time, before the interval is known.
@@ -107,11 +139,13 @@ impl<'a> Training<'a> {
         let splits = Splits::open(data, options, &trained_with, progress)?;
         trained_with.validation = Some(splits.to_string());
         require_images(&splits.train)?;
+        let (cloud, of_cloud) = settings.cloud(splits.points.as_deref(), progress)?;
         let key = Key::of_images(&splits.train)?
+            .with(of_cloud)
             .with(Key::of_images(&splits.validation)?)
             .and(&format!("{start:?} {tuning:?} {trained_with:?} {:?} {:?}", splits.train, splits.validation))
             .and(env!("CARGO_PKG_VERSION"));
-        Ok(Self { settings, splits, views, trained_with, playback, key })
+        Ok(Self { settings, splits, views, trained_with, playback, cloud, key })
     }
 
     /// Returns the key of everything that the result depends on: images, cameras, settings, version.
@@ -138,6 +172,7 @@ impl<'a> Training<'a> {
             views,
             trained_with,
             playback,
+            cloud,
             key,
         } = self;
         TrainingImages::require_room(&splits.train, &splits.validation, headless)?;
@@ -145,7 +180,7 @@ impl<'a> Training<'a> {
         let division = splits.to_string();
         let images =
             TrainingImages::load(splits.train, &splits.validation, &trained_with, ImageRoom::of_system(), progress)?;
-        let (scene, started) = begin(&images, trained_with, playback, start)?;
+        let (scene, started) = begin(&images, trained_with, playback, start, cloud.as_ref())?;
         let resume = Resume { store, key, every: *save_every };
         let (mut tuned, interrupted) = match train(headless, scene, &images, tuning, Some(resume), Some(out), progress)
         {

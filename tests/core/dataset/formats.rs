@@ -4,6 +4,7 @@
 //! known points to the same pixels, and of splits, times, masks, distortion and wrong folders.
 
 use super::{Folder, with};
+use bevy_gs4d::internal::offline::dataset::point_cloud::{CloudPoint, PointCloud};
 use bevy_gs4d::offline::dataset::{CameraOptions, Dataset, Split, TrainingView};
 use bevy_gs4d::view::Lens;
 use glam::{UVec2, Vec3};
@@ -263,6 +264,64 @@ fn colmap_models_project_points_as_their_cameras_do() {
         }
     }
     assert_eq!(open(&binary, Split::Train).points, Some(binary.path().join("sparse/0/points3D.bin")), "points");
+}
+
+/// Returns a PLY file of two points, of which the second has no finite place, with these encodings and bytes.
+fn points_ply(encoding: &str, color: &str, rows: &[u8]) -> Vec<u8> {
+    let colors = ["red", "green", "blue"].map(|name| format!("property {color} {name}\n")).concat();
+    let header = format!(
+        "ply\nformat {encoding} 1.0\nelement vertex 2\nproperty float x\nproperty double y\nproperty float z\n{colors}property float time\nend_header\n"
+    );
+    [header.as_bytes(), rows].concat()
+}
+
+#[test]
+fn files_of_points_have_places_colors_and_times() {
+    let folder = Folder::new();
+    let row = |x: f32, time: f32| {
+        let place = [&x.to_le_bytes()[..], &(-1.5f64).to_le_bytes(), &0.25f32.to_le_bytes()].concat();
+        [&place[..], &[51, 102, 255], &time.to_le_bytes()].concat()
+    };
+    let mut track = 9u64.to_le_bytes().to_vec();
+    track.extend([2.0, -1.5, 0.25].into_iter().flat_map(f64::to_le_bytes));
+    track.extend([51, 102, 255]);
+    track.extend(0.5f64.to_le_bytes());
+    track.extend(3u64.to_le_bytes());
+    let whole = [&1u64.to_le_bytes()[..], &track, &[7; 24]].concat();
+    let files = [
+        (
+            "a.ply",
+            points_ply("binary_little_endian", "uchar", &[row(2.0, 0.75), row(f32::NAN, 0.75)].concat()),
+            Some(0.75),
+        ),
+        ("b.ply", points_ply("ascii", "float", b"2 -1.5 0.25 0.2 0.4 1 0.75\ninf -1.5 0.25 0 0 0 1\n"), Some(0.75)),
+        ("points3D.bin", whole.clone(), None),
+        ("points3D.txt", b"# a comment\n9 2 -1.5 0.25 51 102 255 0.5 1 0 2 7\n".to_vec(), None),
+    ];
+    for (name, bytes, time) in files {
+        folder.write(name, bytes);
+        let PointCloud(points) = PointCloud::load(&folder.path().join(name)).expect(name);
+        let expected = CloudPoint { position: Vec3::new(2.0, -1.5, 0.25), color: Some(Vec3::new(0.2, 0.4, 1.0)), time };
+        assert_eq!(points, [expected], "{name}: one finite point");
+    }
+    let refused = [
+        ("cut.bin", whole[..whole.len() - 1].to_vec(), "cut off"),
+        ("many.bin", u64::MAX.to_le_bytes().to_vec(), "cut off"),
+        ("words.txt", b"9 2 -1.5 0.25 51 102 256 0.5\n".to_vec(), "line 1: must be ID X Y Z R G B"),
+        ("cut.ply", points_ply("binary_little_endian", "uchar", &row(2.0, 0.75)), "the file is cut"),
+        ("faces.ply", b"ply\nformat ascii 1.0\nelement face 0\nend_header\n".to_vec(), "no element vertex"),
+        (
+            "flat.ply",
+            b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n".to_vec(),
+            "no property y",
+        ),
+        ("points.obj", b"v 1 2 3\n".to_vec(), "it is no file of points"),
+    ];
+    for (name, bytes, reason) in refused {
+        folder.write(name, bytes);
+        let error = PointCloud::load(&folder.path().join(name)).expect_err(name).to_string();
+        assert!(error.contains(name) && error.contains(reason), "{name}, {reason}: {error}");
+    }
 }
 
 #[test]

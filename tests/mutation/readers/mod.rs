@@ -12,6 +12,7 @@ mod imports;
 mod package;
 mod parts;
 mod pictures;
+mod points;
 mod saved;
 mod scores;
 mod settings;
@@ -57,7 +58,7 @@ pub struct Kind {
 }
 
 /// The readers.
-pub static KINDS: [Kind; 35] = [
+pub static KINDS: [Kind; 38] = [
     Kind {
         name: "package",
         about: "packages (.gs4d) in every form, with filters and environment maps",
@@ -120,6 +121,27 @@ pub static KINDS: [Kind; 35] = [
         extension: "txt",
         share: 1,
         make: || Arc::new(datasets::Datasets::new("sparse/0/images.txt")),
+    },
+    Kind {
+        name: "colmap-points",
+        about: "points of a binary COLMAP model",
+        extension: "bin",
+        share: 1,
+        make: || Arc::new(points::Points::new("points3D.bin")),
+    },
+    Kind {
+        name: "colmap-points-text",
+        about: "points of a COLMAP model as text",
+        extension: "txt",
+        share: 1,
+        make: || Arc::new(points::Points::new("points3D.txt")),
+    },
+    Kind {
+        name: "points",
+        about: "points to begin a training with (.ply), as text and binary",
+        extension: "ply",
+        share: 1,
+        make: || Arc::new(points::Points::new("points.ply")),
     },
     Kind {
         name: "cfg-args",

@@ -21,4 +21,6 @@ pub(crate) mod fixture;
 mod tests;
 
 pub(crate) use header::is_ply;
+#[cfg(feature = "offline")]
+pub(crate) use read::vertices;
 pub(crate) use read::{read, still};

@@ -69,6 +69,16 @@ pub(crate) fn still(bytes: &[u8], lost: &mut Vec<String>) -> Result<Columns, Imp
     Ok(columns)
 }
 
+/// Reads the table of the vertices of a file, of any layout.
+///
+/// # Errors
+/// A file that is damaged, or has no vertices.
+#[cfg(feature = "offline")]
+pub(crate) fn vertices(bytes: &[u8]) -> Result<Table<'_>, ImportError> {
+    let tables = tables(&Header::read(bytes)?, bytes)?;
+    vertex(&tables).cloned()
+}
+
 fn vertex<'a, 'b>(tables: &'b [Table<'a>]) -> Result<&'b Table<'a>, ImportError> {
     tables.iter().find(|table| table.name == "vertex").ok_or_else(|| ImportError::damaged("has no element vertex"))
 }

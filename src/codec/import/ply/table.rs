@@ -106,6 +106,12 @@ impl Column<'_> {
         }
     }
 
+    /// Returns the value of a row as a share: of 255 if it is a byte, else the value itself; 0 beyond the last.
+    #[cfg(feature = "offline")]
+    pub(crate) fn share(&self, row: usize) -> f32 {
+        self.f32(row) / if self.scalar == Scalar::U8 { 255.0 } else { 1.0 }
+    }
+
     /// Returns the value of a row as a word of 32 bits; 0 beyond the last, and for values that are no such integer.
     #[inline]
     pub(crate) fn u32(&self, row: usize) -> u32 {

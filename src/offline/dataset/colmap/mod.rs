@@ -9,6 +9,7 @@
 mod binary;
 mod camera;
 mod model;
+mod points;
 mod text;
 
 use super::frame::{Frame, Mask, output_name};
@@ -17,6 +18,7 @@ use super::undivided::Undivided;
 use super::{CameraOptions, DatasetError, FrameProblem, TrainingView, masks, pose};
 use crate::codec::text::is_obeyed;
 use model::Model;
+pub(super) use points::{binary_points, text_points};
 use std::collections::{BTreeMap, HashSet};
 use std::path::{Component, Path, PathBuf};
 

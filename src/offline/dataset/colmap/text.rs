@@ -30,15 +30,15 @@ pub(super) fn read(folder: &Path) -> Result<Model, DatasetError> {
     Ok(Model { source, cameras, images })
 }
 
-fn contents(path: &Path) -> Result<String, DatasetError> {
+pub(super) fn contents(path: &Path) -> Result<String, DatasetError> {
     fs::read_to_string(path).map_err(|reason| DatasetError::Read { path: path.to_owned(), reason })
 }
 
-fn at(path: &Path, line: usize, reason: String) -> DatasetError {
+pub(super) fn at(path: &Path, line: usize, reason: String) -> DatasetError {
     DatasetError::Unusable { path: path.to_owned(), reason: format!("line {}: {reason}", line + 1) }
 }
 
-fn is_entry(line: &str) -> bool {
+pub(super) fn is_entry(line: &str) -> bool {
     let line = line.trim_start();
     !line.is_empty() && !line.starts_with('#')
 }

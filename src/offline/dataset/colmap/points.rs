@@ -1,0 +1,60 @@
+//! The points of a model: `points3D.bin` and `points3D.txt`.
+//!
+//! In: a file. Out: its points with their colors, without the images that show them.
+
+use super::super::DatasetError;
+use super::super::point_cloud::CloudPoint;
+use super::super::stream::Stream;
+use super::text::{at, contents, is_entry};
+use glam::{DVec3, Vec3};
+use std::path::Path;
+
+/// Bytes of an entry of the track of a point: the number of an image, and of a point in it.
+const TRACKED: u64 = 8;
+
+/// Reads a binary file.
+///
+/// # Errors
+/// A file that cannot be read, or ends too early.
+pub(in super::super) fn binary_points(path: &Path) -> Result<Vec<CloudPoint>, DatasetError> {
+    let mut stream = Stream::open(path)?;
+    let mut points = Vec::new();
+    for _ in 0..stream.u64()? {
+        let _id = stream.u64()?;
+        let (place, color) = (stream.f64s::<3>()?, stream.u8s::<3>()?);
+        let [_error] = stream.f64s::<1>()?;
+        let tracked = stream.u64()?;
+        stream.skip(tracked, TRACKED)?;
+        points.push(point(place, color));
+    }
+    Ok(points)
+}
+
+/// Reads a text file: lines of `ID X Y Z R G B ERROR TRACK...`.
+///
+/// # Errors
+/// A file that cannot be read; a line that is no point.
+pub(in super::super) fn text_points(path: &Path) -> Result<Vec<CloudPoint>, DatasetError> {
+    let text = contents(path)?;
+    let lines = text.lines().enumerate().filter(|(_, line)| is_entry(line));
+    lines.map(|(number, line)| of_line(line).map_err(|reason| at(path, number, reason))).collect()
+}
+
+fn of_line(line: &str) -> Result<CloudPoint, String> {
+    let form = || "must be ID X Y Z R G B ERROR and a track: write the model again with COLMAP".to_owned();
+    let mut words = line.split_whitespace().skip(1);
+    let mut place = [0.0f64; 3];
+    for value in &mut place {
+        *value = words.next().and_then(|word| word.parse().ok()).ok_or_else(form)?;
+    }
+    let mut color = [0u8; 3];
+    for value in &mut color {
+        *value = words.next().and_then(|word| word.parse().ok()).ok_or_else(form)?;
+    }
+    Ok(point(place, color))
+}
+
+fn point(place: [f64; 3], color: [u8; 3]) -> CloudPoint {
+    let color = Vec3::from(color.map(f32::from)) / 255.0;
+    CloudPoint { position: DVec3::from(place).as_vec3(), color: Some(color), time: None }
+}

@@ -1,0 +1,74 @@
+//! Points to begin a training with.
+//!
+//! In: a file of points: PLY (`x`, `y`, `z`, optionally `red`, `green`, `blue` and `time`), or COLMAP's `points3D.bin` and `points3D.txt`. Out: a
+//! [`PointCloud`]. Points whose place or time is not finite are left out. No count of a file is trusted before as many bytes are there.
+
+use super::DatasetError;
+use super::colmap;
+use crate::codec::import::ply::{is_ply, vertices};
+use glam::Vec3;
+use std::fs;
+use std::path::Path;
+
+/// The name of the file beside `transforms_train.json` that the original begins with.
+pub(super) const BESIDE: &str = "points3d.ply";
+
+/// A point of a file.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CloudPoint {
+    /// World space of the cameras.
+    pub position: Vec3,
+    /// RGB, 0 to 1; `None` if the file has no colors.
+    pub color: Option<Vec3>,
+    /// In the unit of timestamps; `None` if the file has no times.
+    pub time: Option<f32>,
+}
+
+/// Points, possibly none.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PointCloud(pub Vec<CloudPoint>);
+
+impl PointCloud {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// A file that cannot be read, that is damaged or of another kind.
+    pub fn load(path: &Path) -> Result<Self, DatasetError> {
+        let has = |ending: &str| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(ending));
+        let mut points = match (has("bin"), has("txt")) {
+            (true, _) => colmap::binary_points(path)?,
+            (_, true) => colmap::text_points(path)?,
+            _ => ply(path)?,
+        };
+        points.retain(|point| point.position.is_finite() && point.time.is_none_or(f32::is_finite));
+        Ok(Self(points))
+    }
+}
+
+/// Reads a PLY file.
+fn ply(path: &Path) -> Result<Vec<CloudPoint>, DatasetError> {
+    let bytes = fs::read(path).map_err(|reason| DatasetError::Read { path: path.to_owned(), reason })?;
+    if !is_ply(&bytes) {
+        return Err(unusable(path, "it is no file of points: PLY and COLMAP's points3D.bin and points3D.txt are read"));
+    }
+    let faulty = |error: crate::codec::import::ImportError| unusable(path, &error.to_string());
+    let table = vertices(&bytes).map_err(faulty)?;
+    let places = table.all(["x", "y", "z"]).map_err(faulty)?;
+    let colors = table.all(["red", "green", "blue"]).ok();
+    let time = table.column("time");
+    let point = |index: usize| CloudPoint {
+        position: Vec3::from(places.map(|column| column.f32(index))),
+        color: colors.map(|columns| color(columns.map(|column| column.share(index)))),
+        time: time.map(|column| column.f32(index)),
+    };
+    Ok((0..table.len()).map(point).collect())
+}
+
+/// Returns a color of these shares, each of which is finite.
+fn color(shares: [f32; 3]) -> Vec3 {
+    Vec3::from(shares.map(|share| if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.0 }))
+}
+
+fn unusable(path: &Path, reason: &str) -> DatasetError {
+    DatasetError::Unusable { path: path.to_owned(), reason: reason.to_owned() }
+}
