@@ -14,10 +14,12 @@
 //! (`distortion`), and models that cannot be undone are refused by name. So are golden views whose principal point is not the center, and images of
 //! another aspect ratio than the camera.
 //!
-//! Cameras can be read without any image on disk; [`Dataset::require_images`] reports missing images early.
+//! Cameras can be read without any image on disk; [`Dataset::require_images`] reports missing images early. `point_cloud` reads the points that a
+//! dataset names or has, to begin a training with.
 
 mod camera_file;
 mod camera_options;
+mod cloud_point;
 mod colmap;
 mod dataset_split;
 mod distortion;

@@ -3,6 +3,8 @@
 //! In: a file of points: PLY (`x`, `y`, `z`, optionally `red`, `green`, `blue` and `time`), or COLMAP's `points3D.bin` and `points3D.txt`. Out: a
 //! [`PointCloud`]. Points whose place or time is not finite are left out. No count of a file is trusted before as many bytes are there.
 
+pub use super::cloud_point::CloudPoint;
+
 use super::DatasetError;
 use super::colmap;
 use crate::codec::import::ply::{is_ply, vertices};
@@ -12,17 +14,6 @@ use std::path::Path;
 
 /// The name of the file beside `transforms_train.json` that the original begins with.
 pub(super) const BESIDE: &str = "points3d.ply";
-
-/// A point of a file.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CloudPoint {
-    /// World space of the cameras.
-    pub position: Vec3,
-    /// RGB, 0 to 1; `None` if the file has no colors.
-    pub color: Option<Vec3>,
-    /// In the unit of timestamps; `None` if the file has no times.
-    pub time: Option<f32>,
-}
 
 /// Points, possibly none.
 #[derive(Debug, Clone, PartialEq)]

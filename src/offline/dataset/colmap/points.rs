@@ -3,7 +3,7 @@
 //! In: a file. Out: its points with their colors, without the images that show them.
 
 use super::super::DatasetError;
-use super::super::point_cloud::CloudPoint;
+use super::super::cloud_point::CloudPoint;
 use super::super::stream::Stream;
 use super::text::{at, contents, is_entry};
 use glam::{DVec3, Vec3};
