@@ -143,6 +143,10 @@ fn an_interrupted_run_has_written_the_best_parameters() {
     let json: Value = serde_json::from_str(&run.out).expect("one JSON document");
     assert_eq!((&json["interrupted"], json["gaussians"].as_u64()), (&true.into(), Some(200)), "{json}");
     assert!(err.contains("200 Gaussians") && err.contains(" left"), "progress has count and time left: {err}");
+    let shown = capture.path("out.gs4d.train/training.png");
+    assert!(err.contains(&format!("{} shows a view", shown.display())), "the picture is named: {err}");
+    let picture = image::open(shown).expect("the picture of the last evaluation is whole").to_rgb8();
+    assert_eq!(picture.dimensions(), (120, 40), "image, capture and difference side by side");
     let info = gs4d(&arguments!["info", &out, "--json"]).json();
     assert_eq!(info["gaussians"].as_u64(), Some(200), "the package is whole: {info}");
 }

@@ -34,6 +34,7 @@ mod passes;
 mod phases;
 mod places;
 mod prefetch;
+mod preview;
 mod random_words;
 mod records;
 mod regularizer;

@@ -11,6 +11,7 @@ use crate::offline::store::{Key, Store};
 use crate::offline::stored::{Stored, Text};
 use crate::scene::TemporalFilter;
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 
 /// Name of the file.
 const FILE: &str = "fine-tune.state";
@@ -91,6 +92,11 @@ impl<'a> Saves<'a> {
     /// Returns where a run with these settings stores its state.
     pub(super) fn new(resume: Resume<'a>, settings: &FineTuneSettings) -> Self {
         Self { resume, key: resume.key.and(&format!("{settings:?}")) }
+    }
+
+    /// Returns the folder of the state.
+    pub(super) fn folder(self) -> &'a Path {
+        self.resume.store.folder()
     }
 
     /// Returns whether the state is stored after this step.

@@ -21,7 +21,7 @@ use crate::offline::temporal_filter::seen_filter;
 use crate::offline::{OfflineError, Progress, sliced};
 use crate::renderer::{GpuError, Headless, ShaderChecks};
 use crate::scene::{FilterKind, GaussianScene, RuntimeScene, TemporalFilter, TrainedWith};
-use crate::view::{Background, Frame, View};
+use crate::view::{Background, Frame, Picture, View};
 use glam::Vec3;
 
 /// Views that are drawn before the first step, so that there is room for the pairs of all.
@@ -227,6 +227,14 @@ impl<'a> Run<'a> {
         let background = self.background;
         let trainer = &mut self.trainer;
         psnr(self.images, background, |view| trainer.draw(view, background))
+    }
+
+    /// Returns the image of a validation view over the background, of a training view without any, and the scene in its present state there;
+    /// `None` without views.
+    pub(super) fn shown(&mut self) -> Result<Option<(Picture, Picture)>, OfflineError> {
+        let Some((view, image)) = self.images.shown()? else { return Ok(None) };
+        let frame = self.trainer.draw(view, self.background)?;
+        Ok(Some((image.over(behind(self.background)), frame.picture)))
     }
 
     /// Returns the same PSNR of another scene, such as a compressed one.

@@ -158,6 +158,17 @@ impl TrainingImages {
         camera_numbers(&self.views)
     }
 
+    /// Returns the validation view in the middle, or that of training if there is none for validation, with its image.
+    pub(super) fn shown(&self) -> Result<Option<(&View, Cow<'_, CoveredImage>)>, DatasetError> {
+        let (shots, views) = match self.validation.is_empty() {
+            true => (&self.shots, &self.views),
+            false => (&self.validation, &self.validation_views),
+        };
+        let middle = shots.len() / 2;
+        let both = shots.get(middle).zip(views.get(middle));
+        both.map(|(shot, view)| Ok((&shot.view, image_of(shot, view)?))).transpose()
+    }
+
     /// Returns the number of images in memory, with those of validation.
     pub fn in_memory(&self) -> usize {
         self.shots.iter().chain(&self.validation).filter(|shot| shot.image.is_some()).count()

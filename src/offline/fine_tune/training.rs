@@ -5,6 +5,7 @@
 use super::best::{Best, Progressed};
 use super::grown::Grown;
 use super::outcome::CurvePoint;
+use super::preview::Preview;
 use super::resume::{Checkpoint, Saves};
 use super::run::Run;
 use super::schedule::decay;
@@ -46,6 +47,10 @@ pub(super) fn train(
             (vec![point], Best { point, state: run.trainer.state()? })
         }
     };
+    let mut preview = saves.filter(|_| settings.growth.is_some()).map(|saves| Preview::new(saves.folder()));
+    if let Some(preview) = &mut preview {
+        preview.write(run, progress)?;
+    }
     let first = curve.last().map_or(0, |last| last.step);
     progress.begin(settings.task(), settings.steps);
     (0..first).for_each(|_| progress.advance());
@@ -96,6 +101,9 @@ pub(super) fn train(
         progress.note(&format!("{}{growth}", point.describe(Some(speed))));
         grown = Grown::default();
         curve.push(point);
+        if let Some(preview) = &mut preview {
+            preview.write(run, progress)?;
+        }
         if point.psnr > best.point.psnr || point.psnr.is_none() {
             best = Best { point, state: run.trainer.state()? };
             if step < settings.steps {
@@ -118,6 +126,9 @@ pub(super) fn train(
         ));
     }
     progress.finish();
+    if let Some(preview) = preview {
+        preview.remove();
+    }
     Ok(Progressed { curve, best, pace: (step - first, seconds) })
 }
 
