@@ -173,13 +173,10 @@ impl Pictures {
     ) -> Result<(), OfflineError> {
         let each = (self.beside + drawing).max(self.work);
         let needed = pixels(self.largest).saturating_mul(each).saturating_add(self.held);
-        match (needed > LITTLE).then(available).flatten() {
-            Some(available) if needed > available => {
-                let (count, size) = (self.count.max(1), self.largest);
-                Err(OfflineError::Memory { count, size, needed, available, remedy })
-            }
-            _ => Ok(()),
-        }
+        require_of(needed, available).map_err(|available| {
+            let (count, size) = (self.count.max(1), self.largest);
+            OfflineError::Memory { count, size, needed, available, remedy }
+        })
     }
 }
 
@@ -226,10 +223,15 @@ pub(crate) fn room_for_images() -> u64 {
 /// Checks that there are so many bytes of memory. If the available memory is unknown, all are there.
 ///
 /// # Errors
-/// The needed and the available bytes.
-pub(super) fn require_bytes(needed: u64) -> Result<(), (u64, u64)> {
+/// The available bytes.
+pub(super) fn require_bytes(needed: u64) -> Result<(), u64> {
+    require_of(needed, available)
+}
+
+/// Checks as [`require_bytes`], with what is available.
+fn require_of(needed: u64, available: impl FnOnce() -> Option<u64>) -> Result<(), u64> {
     match (needed > LITTLE).then(available).flatten() {
-        Some(available) if needed > available => Err((needed, available)),
+        Some(available) if needed > available => Err(available),
         _ => Ok(()),
     }
 }

@@ -44,13 +44,9 @@ pub(crate) fn require_room(headless: &Headless, count: usize, degree: u32, degre
     let limited = |reason| OfflineError::Limit { reason, remedy: REMEDY };
     let (count, stride) = (count as u64, stride(degree, degree_t));
     require_gaussians(headless, count).map_err(limited)?;
-    let state = count.saturating_mul(3 * each(stride));
-    require_bytes(state.saturating_mul(STATES)).map_err(|(needed, available)| OfflineError::Gaussians {
-        count,
-        needed,
-        available,
-        remedy: REMEDY,
-    })?;
+    let needed = count.saturating_mul(3 * each(stride)).saturating_mul(STATES);
+    let lacking = |available| OfflineError::Gaussians { count, needed, available, remedy: REMEDY };
+    require_bytes(needed).map_err(lacking)?;
     require_memory(headless, bytes(count, stride)).map_err(limited)
 }
 
