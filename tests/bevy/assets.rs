@@ -8,15 +8,16 @@ use crate::support::event_log::{record, take_events};
 use crate::support::pth::Pth;
 use crate::support::waiting::{LOAD_TIMEOUT, wait_until};
 use bevy::app::SubApp;
-use bevy::asset::AssetLoadFailedEvent;
 use bevy::asset::io::memory::{Dir, MemoryAssetReader};
 use bevy::asset::io::{AssetReader, AssetReaderError, AssetSourceBuilder, PathStream, Reader};
 use bevy::asset::saver::{SaveAssetError, SavedAsset, save_using_saver};
+use bevy::asset::{AssetLoadError, AssetLoadFailedEvent, AssetTrackingSystems, LoadState};
 use bevy::prelude::*;
 use bevy::render::RenderApp;
 use bevy::tasks::block_on;
 use bevy_gs4d::asset::{
-    CaptureFailed, CaptureReady, CaptureSaveError, CaptureState, GaussianCapture, PackageSaver, PackageSaverSettings,
+    CaptureAssetSystems, CaptureFailed, CaptureReady, CaptureSaveError, CaptureState, GaussianCapture, PackageSaver,
+    PackageSaverSettings,
 };
 use bevy_gs4d::codec::ReadOptions;
 use bevy_gs4d::codec::package::WriteSettings;
@@ -30,6 +31,7 @@ use std::fs;
 use std::path::Path;
 use std::sync::mpsc::{self, Receiver};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
 use tempfile::TempDir;
 
 /// Returns an app whose assets are in `folder`. It watches the files only with `watch`; all other reloads are explicit.
@@ -243,6 +245,52 @@ fn a_repaired_file_can_be_loaded_again() {
     reload(&app, "late.gs4d");
     wait(&mut app, "loading", |app| is_ready(app, entity));
     assert_eq!(take_events(&mut app), [ready(entity, &capture)], "the repaired file is ready");
+}
+
+#[test]
+fn a_failure_is_sent_while_the_server_loads_again() {
+    /// The sender that opens the gate, until it has been used.
+    #[derive(Resource)]
+    struct Gate(Option<mpsc::Sender<()>>);
+    /// Runs after the server has received a failure and before the states are updated: lets Bevy's second attempt begin.
+    fn begin_again(server: Res<AssetServer>, mut gate: ResMut<Gate>, captures: Query<&GaussianCapture3d>) {
+        let state = || captures.iter().find_map(|capture| server.get_load_state(capture.0.id()));
+        if let Some(LoadState::Failed(error)) = state()
+            && matches!(*error, AssetLoadError::AssetLoaderError(_))
+            && let Some(open) = gate.0.take()
+        {
+            open.send(()).expect("the reader waits");
+            let start = Instant::now();
+            while !matches!(state(), Some(LoadState::Loading)) {
+                assert!(start.elapsed() < LOAD_TIMEOUT, "the second attempt begins: {:?}", state());
+                std::thread::yield_now();
+            }
+        }
+    }
+    let (open, gate) = mpsc::channel();
+    let files = Dir::default();
+    let gated = Gated { files: MemoryAssetReader { root: files.clone() }, gate: Arc::new(Mutex::new(gate)) };
+    let mut app = App::new();
+    app.register_asset_source("gated", AssetSourceBuilder::new(move || Box::new(gated.clone())));
+    app.add_plugins((MinimalPlugins, AssetPlugin::default(), GaussianCapturePlugin));
+    record::<CaptureFailed>(&mut app, Update);
+    app.insert_resource(Gate(None))
+        .add_systems(PreUpdate, begin_again.after(AssetTrackingSystems).before(CaptureAssetSystems));
+    let capture = load(&app, "gated://late.gs4d");
+    let entity = spawn(&mut app, &capture);
+    open.send(()).expect("the reader waits");
+    wait(&mut app, "failing", |app| matches!(state(app, entity), CaptureState::Failed(_)));
+    assert_eq!(take_events(&mut app).len(), 1, "the missing file is reported");
+
+    files.insert_asset(Path::new("late.gs4d"), b"not a package".to_vec());
+    app.insert_resource(Gate(Some(open.clone())));
+    reload(&app, "gated://late.gs4d");
+    open.send(()).expect("the reader waits");
+    wait(&mut app, "failing again", |app| app.world().resource::<Gate>().0.is_none());
+    let said = take_events(&mut app);
+    assert!(said.len() == 1 && !said[0].contains("check the name"), "the broken file is reported once: {said:?}");
+    wait(&mut app, "the second attempt", |app| matches!(state(app, entity), CaptureState::Failed(_)));
+    assert_eq!(take_events(&mut app), [""; 0], "the second attempt fails with the same error");
 }
 
 #[test]

@@ -77,15 +77,18 @@ pub(super) fn update_states(
             if let Some(error) = failed.get(&id) {
                 announcer.failed(entity, error.clone());
             }
+        } else if let Some(error) = failed.get(&id) {
+            // Independent of the server's load state: Bevy repeats a failed reload immediately, so it may be loading again.
+            state.set_if_neq(CaptureState::Failed(error.clone()));
+            announcer.failed(entity, error.clone());
         } else if let Some(LoadState::Failed(error)) = server.get_load_state(id) {
-            let is_new = failed.contains_key(&id) || capture.is_changed();
-            if is_new || !state.has_failed() {
+            if capture.is_changed() || !state.has_failed() {
                 let error = match server.get_path(id) {
                     Some(path) => describe(path, &error),
                     None => error.to_string(),
                 };
                 state.set_if_neq(CaptureState::Failed(error.clone()));
-                if is_new {
+                if capture.is_changed() {
                     announcer.failed(entity, error);
                 }
             }
