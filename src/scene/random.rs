@@ -27,6 +27,11 @@ impl Random {
         low + (high - low) * self.unit()
     }
 
+    /// Returns an index below `count`, which is not 0.
+    pub(crate) fn below(&mut self, count: usize) -> usize {
+        ((self.unit() * count as f32) as usize).min(count - 1)
+    }
+
     /// Returns two independent numbers of the standard normal distribution (Box and Muller).
     pub(crate) fn normal_pair(&mut self) -> [f32; 2] {
         // 1 - unit is never 0.

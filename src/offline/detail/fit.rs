@@ -43,7 +43,7 @@ pub(super) fn fit(
         proceed(progress)?;
         let mut batch = Vec::with_capacity(BATCH);
         for _ in 0..BATCH {
-            let index = ((random.unit() * looks.len() as f32) as usize).min(looks.len() - 1);
+            let index = random.below(looks.len());
             let background = Background::Color([random.unit(), random.unit(), random.unit()]);
             let (view, image) = (&views[index], &images[index]);
             batch.push(Sample { view, image, background, number: index as u32 });

@@ -46,7 +46,7 @@ impl Rates {
     pub const OURS: Self = Self { mean: 1.6e-4, ..Self::ORIGINAL };
 
     /// Returns the rates of the first four four-vectors of each Gaussian's raw parameters and of the fifth, as `adam` reads them.
-    pub(super) fn of_parameters(&self, spatial_lr_scale: f64, factor: f64) -> [[f32; 4]; 5] {
+    pub(crate) fn of_parameters(&self, spatial_lr_scale: f64, factor: f64) -> [[f32; 4]; 5] {
         let rate = |rate: f64| (rate * factor) as f32;
         let mean = rate(self.mean * spatial_lr_scale);
         [
@@ -117,7 +117,7 @@ pub(super) fn relocation_seed(seed: u64, steps: usize) -> u64 {
 }
 
 /// Returns the factor on all rates at a step: it falls to `last` along a half cosine.
-pub(super) fn decay(step: usize, steps: usize, last: f64) -> f64 {
+pub(crate) fn decay(step: usize, steps: usize, last: f64) -> f64 {
     let done = step as f64 / steps.max(1) as f64;
     last + (1.0 - last) * 0.5 * (1.0 + (std::f64::consts::PI * done).cos())
 }
@@ -127,8 +127,7 @@ fn shuffled(count: usize, seed: u64, epoch: u64) -> Vec<usize> {
     let mut random = Random::new(mixed(seed.wrapping_add(1), epoch));
     let mut order: Vec<usize> = (0..count).collect();
     for last in (1..count).rev() {
-        let other = (random.unit() * (last + 1) as f32) as usize;
-        order.swap(last, other.min(last));
+        order.swap(last, random.below(last + 1));
     }
     order
 }

@@ -51,7 +51,7 @@ pub(super) fn hull(
         let chunk = |chunk: u64| {
             let mut random = Random::new(seed ^ (round * CHUNKS + chunk + 1).wrapping_mul(0xD129_0D3A_2B5C_6F1D));
             let candidate = |_| {
-                let index = ((random.unit() * silhouettes.len() as f32) as usize).min(silhouettes.len() - 1);
+                let index = random.below(silhouettes.len());
                 let offset = Vec3::from([(); 3].map(|()| random.in_range(-1.0, 1.0)));
                 let position = region.center + region.half * offset;
                 let late = random.unit();

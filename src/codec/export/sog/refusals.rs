@@ -80,7 +80,7 @@ fn a_wrong_meta_json_is_refused_with_the_fault() {
 fn a_cut_or_changed_file_never_panics() {
     for bytes in [still(300), written("sogst", &columns(300, 1))] {
         let mut random = Random::new(11);
-        let mut at = |length: usize| ((random.unit() * length as f32) as usize).min(length - 1);
+        let mut at = |length: usize| random.below(length);
         let entries = unpacked(&bytes).1;
         for trial in 0..400 {
             let mut other = bytes.clone();
