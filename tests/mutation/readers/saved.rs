@@ -58,6 +58,7 @@ impl Saved {
             data,
             out,
             splits: SplitOptions::default(),
+            drawn: Vec::new(),
             background: None,
             goal: Goal::Keep(30),
             rounds: 1,
