@@ -11,7 +11,6 @@ use super::progress::Bars;
 use super::report::Report;
 use super::table::{bytes, lines};
 use crate::offline::bake::{BakeSettings, Baked, bake, bake_job};
-use crate::offline::dataset::TrainingView;
 use crate::offline::engine::{Engine, EngineChoice};
 use crate::offline::evaluation::color_name;
 use crate::offline::files::Files;
@@ -76,9 +75,6 @@ pub(super) struct Bake {
     /// Steps of training from pictures [default: 20000].
     #[arg(long, help_heading = "Training from pictures", value_name = "N", value_parser = values::count(100_000_000))]
     train_steps: Option<usize>,
-    /// Steps of training a capture that deforms, before the other, as of gs4d train [default: 0].
-    #[arg(long, help_heading = "Training from pictures", value_name = "N", conflicts_with_all = ["environment", "exposure"])]
-    deformation_steps: Option<usize>,
     /// Rows of the environment map that is trained behind the Gaussians, as of gs4d train, for images without transparent pixels and masks
     /// [default: 0, none].
     #[arg(long, help_heading = "Training from pictures", value_name = "ROWS", value_parser = clap::value_parser!(u32).range(0..=4096))]
@@ -238,7 +234,7 @@ impl Bake {
     pub(super) fn run(&self) -> Result<Report, Failure> {
         self.engine.check(&self.given, &OF_TRAINING)?;
         self.scoring.check(&self.given, &[self.variant])?;
-        let (mut settings, progress) = (self.settings(self.package.out()?)?, &mut Bars::default());
+        let (settings, progress) = (self.settings(self.package.out()?)?, &mut Bars::default());
         settings.check_files()?;
         let job = self.jobs.job(&self.given, self.is_dataset())?;
         if let Some(path) = &self.jobs.plan {
@@ -246,9 +242,7 @@ impl Bake {
         }
         let (scene, engine) = if self.is_dataset() {
             let engine = self.engine.open(&self.given, &OF_TRAINING)?;
-            let (scene, drawn, engine) = self.train(&settings, job, engine, progress)?;
-            settings.drawn = drawn;
-            (scene, engine)
+            self.train(&settings, job, engine, progress)?
         } else {
             (self.checkpoint.load_to_change(&self.input)?, self.engine.open(&self.given, &OF_TRAINING)?)
         };
@@ -307,7 +301,6 @@ impl Bake {
         training.start.environment = self.environment.unwrap_or(training.start.environment);
         let steps = self.train_steps.unwrap_or(TrainSettings::STEPS);
         training.tuning = FineTuneSettings { exposure: self.exposure, ..TrainSettings::tuning(steps) };
-        training.deformation = self.deformation_steps.unwrap_or(training.deformation);
         training.capture = self.checkpoint.capture();
         training
     }
@@ -321,7 +314,7 @@ impl Bake {
     fn data(&self) -> Result<&Path, Failure> {
         match (&self.data, self.is_dataset()) {
             (Some(data), false) => {
-                let of_pictures = ["--gaussians", "--train-steps", "--environment", "--deformation-steps"];
+                let of_pictures = ["--gaussians", "--train-steps", "--environment"];
                 self.given.none_of(&of_pictures, "with a checkpoint: it is for training from pictures")?;
                 Ok(data)
             }
@@ -344,12 +337,12 @@ impl Bake {
         job: Option<Job>,
         mut engine: Engine,
         progress: &mut Bars,
-    ) -> Result<(GaussianScene, Vec<TrainingView>, Engine), Failure> {
+    ) -> Result<(GaussianScene, Engine), Failure> {
         let deferred = interrupt::defer();
         let only = job.map(|job| job.stage);
-        let (scene, drawn) = train_dataset(&self.training(settings), &settings.out, only, &mut engine, progress)?;
+        let scene = train_dataset(&self.training(settings), &settings.out, only, &mut engine, progress)?;
         drop(deferred);
-        Ok((scene, drawn, engine))
+        Ok((scene, engine))
     }
 
     fn settings(&self, out: &Path) -> Result<BakeSettings, Failure> {
@@ -359,7 +352,6 @@ impl Bake {
             data,
             out: out.to_owned(),
             splits: SplitOptions { size: None, resolution: self.resolution, validation: self.validation.validation },
-            drawn: Vec::new(),
             background: self.checkpoint.background,
             goal: self.goal(),
             rounds: self.rounds,

@@ -77,10 +77,6 @@ pub(super) struct Train {
     /// pixels and masks that show what surrounds the scene; 0: none.
     #[arg(long, value_name = "ROWS", default_value = "0", value_parser = clap::value_parser!(u32).range(0..=4096))]
     environment: u32,
-    /// Steps of training a capture that deforms, before the other, which begins from it and is trained on views that it draws beside the images: for
-    /// images of one moving camera with silhouettes, between moments that are far apart; 0: none.
-    #[arg(long, help_heading = "Experimental", value_name = "N", default_value = "0")]
-    deformation_steps: usize,
     /// Number of training steps.
     #[arg(long, value_name = "N", default_value = "20000", value_parser = values::count(100_000_000))]
     steps: usize,
@@ -164,7 +160,7 @@ impl Train {
         let mut headless = self.renderer.open()?;
         let deferred = interrupt::defer();
         let trained = training.run(&mut headless, &store, out, progress)?;
-        let TrainedCapture { tuned, started, views, drawn, splits, interrupted } = &trained;
+        let TrainedCapture { tuned, started, views, splits, interrupted } = &trained;
         let (from, interrupted) = (started.name(), *interrupted);
         let size = self.package.save(&tuned.scene)?;
         drop(deferred);
@@ -187,9 +183,6 @@ impl Train {
             ("PSNR", quality),
             ("wrote", format!("{}, {}", out.display(), bytes(size))),
         ];
-        if !drawn.is_empty() {
-            pairs.push(("drawn views", format!("{}, trained on beside the others", drawn.len())));
-        }
         pairs.extend(exposure_row(tuned));
         if interrupted {
             pairs.push(("interrupted", "wrote the best parameters so far; the same command resumes".to_owned()));
@@ -204,7 +197,6 @@ impl Train {
             "start": from,
             "environment": environment,
             "views": views,
-            "drawn_views": drawn.len(),
             "validation": validation,
             "split": splits,
             "time_interval": scene.trained_with.time_interval,
@@ -236,14 +228,6 @@ impl Train {
         if matches!(self.start, Start::Hull | Start::Random) {
             self.given.none_of(&["--points"], &format!("with --start {}", self.start.name()))?;
         }
-        if self.deformation_steps > 0 {
-            let others = ["--start", "--points", "--time-scale", "--environment", "--exposure"];
-            self.given.none_of(&others, "with --deformation-steps, which begins from a hull of silhouettes")?;
-            if self.densify == Densify::Original {
-                self.given
-                    .none_of(&["--deformation-steps"], "with --densify original, which begins with few Gaussians")?;
-            }
-        }
         match self.sh_degree < 3 {
             true => self.given.none_of(&["--sh-degree-t"], WITHOUT_TIME),
             false => Ok(()),
@@ -272,7 +256,6 @@ impl Train {
             capture: CaptureSettings { time_interval: self.time_interval, background: self.background },
             start: self.start_settings(),
             points: self.points.clone(),
-            deformation: self.deformation_steps,
             tuning: self.tuning(),
             save_every: self.save_every,
         }

@@ -3,7 +3,6 @@
 //! In: paths, goals and choices of the user. Out: [`BakeSettings`], whose files can be checked before anything is computed.
 
 use crate::offline::OfflineError;
-use crate::offline::dataset::TrainingView;
 use crate::offline::files::Files;
 use crate::offline::fine_tune::FineTuneSettings;
 use crate::offline::quantize::Quality;
@@ -24,9 +23,6 @@ pub struct BakeSettings {
     pub data: PathBuf,
     /// How the views are read and divided.
     pub splits: SplitOptions,
-    /// Views to train on beside those of the dataset: those that a [deformation](super::train::TrainedCapture::drawn) has drawn. Nothing is scored or
-    /// validated on them.
-    pub drawn: Vec<TrainingView>,
     /// The package to write; must not be the checkpoint.
     pub out: PathBuf,
     /// Background, RGB, 0 to 1; `None` uses the background that the capture was trained with.

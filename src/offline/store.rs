@@ -10,7 +10,6 @@ use super::temporary_file;
 use crate::codec::CodecError;
 use crate::offline::{OfflineError, Progress, proceed, unfinished, write_beside};
 use rayon::prelude::*;
-use std::ffi::OsStr;
 use std::fmt;
 use std::fs::{self, File, TryLockError};
 use std::io::{self, ErrorKind, Read, Write};
@@ -30,9 +29,6 @@ const VERSION: u32 = 2;
 const HASH: usize = 32;
 /// Bytes of the header: magic, version, key, hash of the body.
 const HEAD: usize = 8 + 2 * HASH;
-
-/// First part of the names of images that are drawn into the folder.
-const DRAWN: &str = "drawn_";
 
 /// Name of the file that is locked while a run works in the folder.
 const LOCK: &str = "lock";
@@ -333,27 +329,12 @@ fn is_at(file: &File, path: &Path) -> bool {
 
 /// Returns whether a file is a stored result, or the lock of a stage whose run was killed.
 fn is_stored(path: &Path) -> bool {
-    if is_drawn(path) {
-        return path.is_file();
-    }
     if path.extension().is_some_and(|extension| extension == LOCK) {
         return path.is_file();
     }
     let mut start = [0; MAGIC.len()];
     let read = path.is_file() && File::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok();
     read && start == MAGIC
-}
-
-/// Returns the name, without its ending, of an image that is drawn into the folder.
-pub(crate) fn drawn_name(number: usize) -> String {
-    format!("{DRAWN}{number:04}")
-}
-
-fn is_drawn(path: &Path) -> bool {
-    let stem = path.file_stem().and_then(OsStr::to_str).unwrap_or_default();
-    let number = stem.strip_prefix(DRAWN).and_then(|number| number.parse().ok());
-    path.extension().is_some_and(|extension| extension == "png")
-        && number.is_some_and(|number| drawn_name(number) == stem)
 }
 
 fn head(key: Key, body: &[u8]) -> [u8; HEAD] {
@@ -398,9 +379,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let out = folder.path().join("scene.gs4d");
         let work = Store::beside(&out, ".bake").expect("the folder can be made");
-        let (path, foreign) = (work.folder().to_owned(), work.folder().join("drawn_by_me.png"));
-        fs::write(work.folder().join(drawn_name(12)).with_extension("png"), b"drawn")
-            .expect("the folder can be written to");
+        let (path, foreign) = (work.folder().to_owned(), work.folder().join("notes.txt"));
         work.store("kept", Key::of(b"inputs"), b"some bytes").expect("the folder can be written to");
         fs::write(&foreign, b"mine").expect("the folder can be written to");
         work.remove().expect("the folder can be listed");

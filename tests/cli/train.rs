@@ -72,8 +72,6 @@ fn points_of_the_dataset_or_of_a_file_are_what_training_begins_with() {
     let red = run(&["--points", points]);
     assert_eq!(red.json()["start"].as_str(), Some("points"), "the file that is given");
     run(&["--points", points, "--start", "hull"]).must_fail("--points has no effect with --start hull");
-    run(&["--deformation-steps", "5"]).must_fail("the images have no transparent pixels and no masks");
-    run(&["--deformation-steps", "5", "--points", points]).must_fail("--points has no effect with --deformation-steps");
     fs::write(&given, "").expect("the folder can be written to");
     run(&["--points", points]).must_fail("points3D.txt: has no points with finite places");
     fs::write(&beside, "ply\n").expect("the folder can be written to");

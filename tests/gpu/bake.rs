@@ -38,7 +38,6 @@ impl Capture {
             data: self.data.clone(),
             out: out.to_owned(),
             splits: SplitOptions::default(),
-            drawn: Vec::new(),
             background: None,
             goal: Goal::Size(15_000),
             rounds: 1,

@@ -6,7 +6,6 @@
 mod appearance;
 mod bake;
 mod crowds;
-mod deformation;
 mod depths_alone;
 mod designs;
 mod detail;
@@ -36,7 +35,6 @@ mod support {
     pub mod blob;
     pub mod capture;
     pub mod composed;
-    pub mod covered;
     pub mod dataset;
     pub mod depth_texture;
     pub mod golden;

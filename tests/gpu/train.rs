@@ -6,7 +6,6 @@
 //! Skipped where there is no GPU.
 
 use crate::support::blob::blob;
-use crate::support::covered::write_covered;
 use crate::support::{dataset, gpu};
 use bevy_gs4d::gaussian::{Gaussian, GradientMode, Harmonics, Parameters};
 use bevy_gs4d::internal::offline::dataset::selection::camera_numbers;
@@ -22,6 +21,7 @@ use bevy_gs4d::offline::dataset::TrainingView;
 use bevy_gs4d::offline::fine_tune::{FineTuneSettings, FineTuned, Growth, ImageRoom, Rates, Resume, TrainingImages};
 use bevy_gs4d::offline::metrics::SquaredError;
 use bevy_gs4d::offline::{NoProgress, OfflineError, Progress, SplitOptions, Splits};
+use bevy_gs4d::reference;
 use bevy_gs4d::renderer::Headless;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{GaussianScene, RuntimeScene, SceneForm, Trained};
@@ -418,6 +418,20 @@ impl Lesson {
         let resume = store.map(|store| Resume { store, key: Key::of(b"blobs"), every: 1 });
         train(headless, scene, &images, settings, resume, out, progress).map_err(Box::new)
     }
+}
+
+/// Writes the image of a view with its coverage, as a camera of this gain takes it.
+fn write_covered(scene: &RuntimeScene, view: &TrainingView, gain: f32, path: &Path) {
+    let to_draw = view.camera.view(view.time, RasterFov::Corrected);
+    let frame = reference::render(scene, &to_draw, Background::None);
+    let mut image = image::RgbaImage::new(view.camera.size.x, view.camera.size.y);
+    let pixels = image.pixels_mut().zip(frame.picture.pixels.iter().zip(&frame.transmittance));
+    for (pixel, (color, transmittance)) in pixels {
+        let coverage = 1.0 - transmittance;
+        let [r, g, b] = (*color * gain / coverage.max(1e-3)).to_array();
+        pixel.0 = [r, g, b, coverage].map(|value| (value.clamp(0.0, 1.0) * 255.0).round() as u8);
+    }
+    image.save(path).expect("the folder can be written to");
 }
 
 fn settings(steps: usize) -> FineTuneSettings {

@@ -64,12 +64,7 @@ impl<'a> Inputs<'a> {
         let read = format!("{:?} {:?} {:?}", scene.trained_with, scene.playback, settings.background);
         let scene_key = Key::of_files(&[checkpoint])?.and(env!("CARGO_PKG_VERSION")).and(&read);
         let cameras_key = Key::of(format!("{:?} {:?}", splits.train, splits.validation).as_bytes());
-        let trained = Key::of_images(&splits.train)?;
-        let trained = match &settings.drawn[..] {
-            [] => trained,
-            drawn => trained.with(Key::of_images(drawn)?).with(Key::of_views(drawn)),
-        };
-        let image_keys = [trained, Key::of_images(&splits.validation)?];
+        let image_keys = [Key::of_images(&splits.train)?, Key::of_images(&splits.validation)?];
         require_room(engine, settings, &views, &splits)?;
         let mut subject = Subject::new(checkpoint, scene, settings.background)?;
         let pixel = trained_pixel(&subject.scene, &views);
@@ -99,7 +94,7 @@ impl<'a> Inputs<'a> {
         }
         let Splits { train, validation, .. } = &self.splits;
         let images = TrainingImages::load(
-            [&train[..], &self.settings.drawn].concat(),
+            train.clone(),
             validation,
             &self.subject.scene.trained_with,
             ImageRoom::of_system(),
@@ -153,10 +148,7 @@ fn require_room(
     // The test views, which are of the same sizes.
     Pictures::evaluated(views, MetricSet::ALL, true).require(engine.headless(), BY_RESOLUTION)?;
     match (engine, &settings.fine_tune) {
-        (Engine::Gpu(headless), Some(_)) => {
-            let trained = [&splits.train[..], &settings.drawn].concat();
-            TrainingImages::require_room(&trained, &splits.validation, headless)
-        }
+        (Engine::Gpu(headless), Some(_)) => TrainingImages::require_room(&splits.train, &splits.validation, headless),
         _ => Ok(()),
     }
 }

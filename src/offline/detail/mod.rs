@@ -27,7 +27,6 @@ use fit::fit;
 pub use looks::Closeness;
 use looks::{Around, FINE, Look, Sphere, closeness, looks};
 use merge::merge;
-pub(crate) use rotation::Axes;
 use serde::Serialize;
 use std::sync::Arc;
 

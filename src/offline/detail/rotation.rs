@@ -9,7 +9,7 @@ use glam::{DMat4, DVec4};
 
 /// A covariance, decomposed: `Q diag(s)² Qᵀ` with the rotation `Q` of the two quaternions.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Axes {
+pub(super) struct Axes {
     /// Standard deviations.
     pub scale: DVec4,
     /// Left quaternion.
@@ -20,7 +20,7 @@ pub(crate) struct Axes {
 
 impl Axes {
     /// Decomposes a covariance. `least` is the smallest standard deviation; variances below its square, also negative ones, are raised to it.
-    pub(crate) fn of(covariance: DMat4, least: f64) -> Self {
+    pub(super) fn of(covariance: DMat4, least: f64) -> Self {
         let (values, mut axes) = eigen(covariance);
         let mut scale = values.max(DVec4::splat(least * least)).map(f64::sqrt);
         let most_time = (0..4).max_by(|&a, &b| axes.col(a).w.abs().total_cmp(&axes.col(b).w.abs())).unwrap_or(3);

@@ -30,27 +30,6 @@ pub fn adam(value: f64, gradient: f64, moments: &mut Moments, rate: f64, step: u
     value - rate * (moments.first / first) / ((moments.second / second).sqrt() + EPSILON)
 }
 
-/// A step for values that are trained on the CPU, in the precision and by the expressions of the shader.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Step {
-    correction: [f32; 2],
-}
-
-impl Step {
-    /// Returns step number `step`, from 1.
-    pub(crate) fn new(step: usize) -> Self {
-        Self { correction: correction(step) }
-    }
-
-    /// Returns the change of a value for a rate of 1, and updates its moments.
-    pub(crate) fn change(self, [first, second]: [&mut f32; 2], gradient: f32) -> f32 {
-        let [of_first, of_second] = DECAY.map(|decay| decay as f32);
-        *first = of_first * *first + (1.0 - of_first) * gradient;
-        *second = of_second * *second + (1.0 - of_second) * gradient * gradient;
-        -self.correction[0] * *first / (second.sqrt() * self.correction[1] + EPSILON as f32)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -62,18 +41,5 @@ mod tests {
         assert!((moments.first - 1e-6).abs() < 1e-18 && (moments.second - 1e-13).abs() < 1e-22, "{moments:?}");
         let still = adam(0.5, 0.0, &mut Moments::default(), 0.1, 1);
         assert_eq!(still, 0.5, "without a gradient nothing moves");
-    }
-
-    #[test]
-    fn steps_in_the_precision_of_the_shader_are_the_same() {
-        let (mut moments, mut own) = (Moments::default(), [0.0f32; 2]);
-        let (mut wanted, mut found) = (1.0, 1.0f32);
-        for step in 1..=200u16 {
-            let gradient = (0.3 * f64::from(step)).sin();
-            wanted = adam(wanted, gradient, &mut moments, 0.01, step.into());
-            let [first, second] = &mut own;
-            found += 0.01 * Step::new(step.into()).change([first, second], gradient as f32);
-            assert!((f64::from(found) - wanted).abs() < 1e-4, "step {step}: {found} for {wanted}");
-        }
     }
 }

@@ -6,7 +6,7 @@ use crate::gaussian::{Harmonics, Parameters};
 use crate::offline::layout::TrainedRecord;
 
 /// Returns the raw parameters as `slice` reads them.
-pub(crate) fn records(parameters: &Parameters) -> Vec<TrainedRecord> {
+pub(super) fn records(parameters: &Parameters) -> Vec<TrainedRecord> {
     let record = |index: usize| TrainedRecord {
         mean: parameters.mean[index],
         mean_t: parameters.mean_t.get(index).copied().unwrap_or_default(),
@@ -42,20 +42,4 @@ pub(super) fn set_harmonics(harmonics: &mut Harmonics, values: &[f32], stride: u
     for (coefficients, values) in harmonics.values.chunks_exact_mut(own.max(1)).zip(values.chunks_exact(stride)) {
         coefficients[..used].copy_from_slice(&values[..used]);
     }
-}
-
-/// Returns the raw parameters of native Gaussians from these records.
-pub(crate) fn parameters(records: &[TrainedRecord]) -> Parameters {
-    let count = records.len();
-    let mut parameters = Parameters {
-        mean: vec![[0.0; 3]; count],
-        mean_t: vec![0.0; count],
-        log_scale: vec![[0.0; 3]; count],
-        log_scale_t: vec![0.0; count],
-        rotation_l: vec![[0.0; 4]; count],
-        rotation_r: vec![[0.0; 4]; count],
-        opacity_logit: vec![0.0; count],
-    };
-    set_parameters(&mut parameters, records);
-    parameters
 }

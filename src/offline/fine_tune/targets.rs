@@ -145,7 +145,7 @@ impl TrainingImages {
     }
 
     /// Returns views of validation with their images, some at a time.
-    pub(crate) fn validated(&self) -> impl Iterator<Item = Result<Vec<(&View, Cow<'_, CoveredImage>)>, DatasetError>> {
+    pub(super) fn validated(&self) -> impl Iterator<Item = Result<Vec<(&View, Cow<'_, CoveredImage>)>, DatasetError>> {
         let parts = self.validation.chunks(AT_ONCE).zip(self.validation_views.chunks(AT_ONCE));
         parts.map(|(shots, views)| {
             let images: Vec<_> = shots.par_iter().zip(views).map(|(shot, view)| image_of(shot, view)).collect();

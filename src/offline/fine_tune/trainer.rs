@@ -354,46 +354,8 @@ impl<'a> Trainer<'a> {
         if self.scene.model() != Some(Model::Rotated4d) {
             return Err(TrainerError::Model);
         }
-        Ok(self.set_relocating()?)
-    }
-
-    /// Compiles the passes that hide Gaussians and move their colors.
-    ///
-    /// # Errors
-    /// A shader that does not compile.
-    pub(crate) fn set_relocating(&mut self) -> Result<(), GpuError> {
         self.grower = Some(Grower::new(self.headless, &self.parameters)?);
         Ok(())
-    }
-
-    /// Returns the raw parameters of all Gaussians.
-    ///
-    /// # Errors
-    /// A lost device.
-    pub(crate) fn records(&self) -> Result<Vec<TrainedRecord>, GpuError> {
-        Ok(bytemuck::pod_collect_to_vec(&self.parameters.geometry.read_values(self.headless)?))
-    }
-
-    /// Returns the gradients with respect to the raw parameters, accumulated since the last step.
-    ///
-    /// # Errors
-    /// A lost device.
-    pub(crate) fn record_gradients(&self) -> Result<Vec<TrainedRecord>, GpuError> {
-        Ok(bytemuck::pod_collect_to_vec(&self.parameters.geometry.read_gradients(self.headless)?))
-    }
-
-    /// Replaces the raw parameters of all Gaussians.
-    pub(crate) fn write_records(&self, records: &[TrainedRecord]) {
-        let queue = &self.headless.context().queue;
-        queue.write_buffer(&self.parameters.geometry.values, 0, bytemuck::cast_slice(records));
-        self.slice();
-    }
-
-    /// Replaces the raw parameters, and copies colors by these moves, to where from where.
-    pub(crate) fn move_colors(&self, records: &[TrainedRecord], moves: &[[u32; 2]]) {
-        if let Some(grower) = &self.grower {
-            grower.apply(self.headless, &self.parameters, records, moves, false);
-        }
     }
 
     /// Hides a share of the Gaussians, drawn with this seed, until the next step is made; 0 unless the scene [grows](Self::set_growing).

@@ -31,9 +31,7 @@ pub enum StartError {
     )]
     NoPoints,
     /// There are no silhouettes.
-    #[error(
-        "the images have no transparent pixels and no masks, so that they have no hull: give --start random, and no --deformation-steps"
-    )]
+    #[error("the images have no transparent pixels and no masks, so that they have no hull: give --start random")]
     NoSilhouettes,
     /// Images that do not show what is behind the scene.
     #[error(
@@ -42,7 +40,7 @@ pub enum StartError {
     NoSurroundings,
     /// There is nothing inside the silhouettes.
     #[error(
-        "no point is inside the silhouettes of the views of a moment (masks or poses of another scene?): give --start random, and no --deformation-steps, to begin without them"
+        "no point is inside the silhouettes of the views of a moment (masks or poses of another scene?): give --start random to begin without them"
     )]
     NoHull,
 }

@@ -10,7 +10,6 @@
 //! | `start` | the Gaussians before the first step, from points |
 //! | `surroundings` | the environment map before the first step |
 //! | `hull` | points inside the silhouettes of a moment |
-//! | `deformation` | on request, the views and the Gaussians to begin with of a capture that deforms |
 //! | `training` | the whole of a training, from the folder of a dataset to the trained capture |
 //! | `once` | the same as the first stage of a bake: a finished training is not repeated |
 //! | `writer` | the package that is rewritten while training goes on |
@@ -19,7 +18,6 @@
 //! views and backgrounds, evaluations, choice of the best step and resumption.
 
 mod capture;
-mod deformation;
 mod error;
 mod hull;
 mod once;

@@ -1,11 +1,10 @@
 //! The stage train of a bake whose input is a dataset: the capture that the stages after it prune and compress.
 //!
-//! In: [`TrainSettings`], the path of the package of a bake. Out: the capture, trained now or by an earlier run with the same inputs, and the views that
-//! were drawn for its training; its package in the trained form at [`trained_path`], from which smaller packages can be baked later.
+//! In: [`TrainSettings`], the path of the package of a bake. Out: the capture, trained now or by an earlier run with the same inputs; its
+//! package in the trained form at [`trained_path`], from which smaller packages can be baked later.
 
 use super::training::{TrainSettings, TrainedCapture, Training};
 use crate::codec::{self, ReadOptions};
-use crate::offline::dataset::TrainingView;
 use crate::offline::engine::Engine;
 use crate::offline::files::Files;
 use crate::offline::store::{Key, Store};
@@ -21,9 +20,9 @@ pub fn trained_path(out: &Path) -> PathBuf {
     out.with_extension("trained.gs4d")
 }
 
-/// Returns the capture of a dataset, and the views that were drawn to train it on beside those of the dataset. Begins the task "training" unless an
-/// earlier run has finished it and the views are still in the folder `OUT.bake`; an interrupted training resumes from that folder. `only` is the only
-/// stage of the bake that may run: another stage than this one needs a training that is done, and the same stage on another machine is waited for.
+/// Returns the capture of a dataset. Begins the task "training" unless an earlier run has finished it; an interrupted training resumes from
+/// the folder `OUT.bake`. `only` is the only stage of the bake that may run: another stage than this one needs a training that is done, and
+/// the same stage on another machine is waited for.
 ///
 /// # Errors
 /// No GPU; views or images that cannot be used, Gaussians that do not fit, a package that cannot be written; [`OfflineError::Interrupted`] if
@@ -34,7 +33,7 @@ pub fn train_dataset(
     only: Option<&str>,
     engine: &mut Engine,
     progress: &mut dyn Progress,
-) -> Result<(GaussianScene, Vec<TrainingView>), OfflineError> {
+) -> Result<GaussianScene, OfflineError> {
     let Engine::Gpu(headless) = engine else { return Err(OfflineError::TrainingWithoutGpu) };
     let trained = trained_path(out);
     Files::default().reads_data(&settings.data).writes_regular(&trained, "gs4d").check()?;
@@ -44,14 +43,14 @@ pub fn train_dataset(
     };
     let training = Training::open(settings, progress)?;
     let key = training.key();
-    let finished = || {
-        let (stored, found) = store.load(STAGE, key).zip(Key::of_file(&trained).ok())?;
-        if stored == found.bytes() { training.drawn(&store) } else { None }
+    let is_done = || {
+        let done = store.load(STAGE, key).zip(Key::of_file(&trained).ok());
+        done.is_some_and(|(stored, found)| stored == found.bytes())
     };
     let mut reserved = None;
     match only {
         Some(STAGE) => reserved = Some(store.reserve(STAGE, progress)?),
-        Some(only) if finished().is_none() => {
+        Some(only) if !is_done() => {
             let message = format!(
                 "has no result of the stage {STAGE} with these inputs: run --only {STAGE} before --only {only}"
             );
@@ -59,23 +58,17 @@ pub fn train_dataset(
         }
         Some(_) | None => {}
     }
-    let drawn = match finished() {
-        Some(drawn) => {
-            progress.note("train: skipped, done before");
-            drawn
+    if is_done() {
+        progress.note("train: skipped, done before");
+    } else {
+        let TrainedCapture { tuned, interrupted, .. } = training.run(headless, &store, &trained, progress)?;
+        save(&trained, &tuned.scene, &write_settings(&tuned.scene.form, None))?;
+        if interrupted {
+            return Err(OfflineError::Interrupted { tuned: None });
         }
-        None => {
-            let TrainedCapture { tuned, drawn, interrupted, .. } =
-                training.run(headless, &store, &trained, progress)?;
-            save(&trained, &tuned.scene, &write_settings(&tuned.scene.form, None))?;
-            if interrupted {
-                return Err(OfflineError::Interrupted { tuned: None });
-            }
-            store.store(STAGE, key, Key::of_file(&trained)?.bytes())?;
-            drawn
-        }
-    };
+        store.store(STAGE, key, Key::of_file(&trained)?.bytes())?;
+    }
     drop(reserved);
     // The stages after this one read the package, so that a resumed run begins with the same bytes.
-    Ok((codec::load(&trained, &ReadOptions::default())?, drawn))
+    Ok(codec::load(&trained, &ReadOptions::default())?)
 }

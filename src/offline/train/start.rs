@@ -18,7 +18,7 @@ use crate::offline::dataset::point_cloud::PointCloud;
 use crate::offline::fine_tune::TrainingImages;
 use crate::offline::fine_tune::neighbors::{NEIGHBORS, neighbors};
 use crate::scene::random::Random;
-use crate::scene::{Environment, GaussianScene, PlaybackHints, SceneForm, Trained, TrainedWith};
+use crate::scene::{GaussianScene, PlaybackHints, SceneForm, Trained, TrainedWith};
 use crate::view::View;
 use glam::Vec3;
 
@@ -84,13 +84,6 @@ pub struct StartSettings {
     pub environment: u32,
 }
 
-impl StartSettings {
-    /// Returns the degree of color in time that is used.
-    pub(super) fn used_degree_t(&self) -> u32 {
-        if self.degree >= 3 { self.degree_t.min(2) } else { 0 }
-    }
-}
-
 impl Default for StartSettings {
     fn default() -> Self {
         Self {
@@ -127,20 +120,16 @@ pub fn begin(
     let (span, background) = (trained_with.time_span(), trained_with.background);
     let usual = || usual_time_scale(images.all_views().map(|view| view.time).collect());
     let scale_t = settings.time_scale.unwrap_or_else(usual) as f32 * span;
-    let native = trained(&points, scale_t, settings.degree.min(3), settings.used_degree_t());
-    let environment = (rows > 0).then(|| surroundings(background, rows));
-    Ok((begun(native, environment, trained_with, playback), start))
-}
-
-/// Returns the scene of these Gaussians.
-pub(super) fn begun(
-    native: Trained,
-    environment: Option<Environment>,
-    trained_with: TrainedWith,
-    playback: PlaybackHints,
-) -> GaussianScene {
-    let form = SceneForm::Trained(native);
-    GaussianScene { form, environment, filter: None, trained_with, playback, levels: Vec::new() }
+    let (degree, degree_t) = (settings.degree.min(3), if settings.degree >= 3 { settings.degree_t.min(2) } else { 0 });
+    let scene = GaussianScene {
+        form: SceneForm::Trained(trained(&points, scale_t, degree, degree_t)),
+        environment: (rows > 0).then(|| surroundings(background, rows)),
+        filter: None,
+        trained_with,
+        playback,
+        levels: Vec::new(),
+    };
+    Ok((scene, start))
 }
 
 /// Returns the usual temporal scale for images of these times, as a share of the interval.
@@ -225,7 +214,7 @@ fn measured(cloud: &PointCloud, interval: [f32; 2], count: usize, random: &mut R
         // The first of a random order (Fisher and Yates).
         let mut order: Vec<usize> = (0..own.len()).collect();
         for index in 0..count {
-            let other = index + random.below(own.len() - index);
+            let other = index + ((random.unit() * (own.len() - index) as f32) as usize).min(own.len() - index - 1);
             order.swap(index, other);
         }
         return order[..count].iter().map(|&index| point(index, Vec3::ZERO, random)).collect();
@@ -269,13 +258,6 @@ fn trained(points: &[StartPoint], scale_t: f32, degree: u32, degree_t: u32) -> T
         own[..3].copy_from_slice(&((point.color - 0.5) / SH_C0).to_array());
     }
     Trained { parameters, harmonics: Harmonics { coefficients, degree, degree_t, values } }
-}
-
-/// Returns Gaussians at these points that neither move nor end.
-pub(super) fn still(points: &[StartPoint], degree: u32) -> Trained {
-    let Trained { parameters, harmonics } = trained(points, 1.0, degree, 0);
-    let parameters = Parameters { mean_t: Vec::new(), log_scale_t: Vec::new(), rotation_r: Vec::new(), ..parameters };
-    Trained { parameters, harmonics }
 }
 
 #[cfg(test)]

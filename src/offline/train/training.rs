@@ -4,9 +4,7 @@
 //! ([`TrainedCapture`]). The package OUT is rewritten while training goes on.
 
 use super::capture::{CaptureSettings, capture_of};
-use super::deformation::{Drawing, Drawn, Extent, fit};
-use super::error::StartError;
-use super::start::{Start, StartSettings, begin, begun};
+use super::start::{Start, StartSettings, begin};
 use super::train;
 use crate::offline::dataset::point_cloud::PointCloud;
 use crate::offline::dataset::{TrainingView, require_images};
@@ -19,9 +17,6 @@ use crate::offline::{OfflineError, Progress, trained_pixel};
 use crate::renderer::Headless;
 use crate::scene::{PlaybackHints, TrainedWith};
 use std::path::{Path, PathBuf};
-
-/// Native Gaussians for each of a capture that deforms, on average.
-const PIECES: usize = 2;
 
 /// What a capture is trained from, and how.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,9 +31,6 @@ pub struct TrainSettings {
     pub start: StartSettings,
     /// File of points to begin with; `None`: that of the dataset, if it has one.
     pub points: Option<PathBuf>,
-    /// Steps of training a capture that deforms, from which the other begins, and whose renders at other times and places are trained on beside the
-    /// images, which must have silhouettes; 0: none.
-    pub deformation: usize,
     /// How it is trained.
     pub tuning: FineTuneSettings,
     /// Steps between two saved states, rounded up to the next evaluation.
@@ -100,8 +92,7 @@ impl TrainSettings {
     /// Returns the usual settings for a dataset.
     pub fn usual(data: PathBuf, splits: SplitOptions) -> Self {
         let (capture, start) = (CaptureSettings::default(), StartSettings::default());
-        let tuning = Self::tuning(Self::STEPS);
-        Self { data, splits, capture, start, points: None, deformation: 0, tuning, save_every: 5000 }
+        Self { data, splits, capture, start, points: None, tuning: Self::tuning(Self::STEPS), save_every: 5000 }
     }
 }
 
@@ -126,10 +117,8 @@ pub struct TrainedCapture {
     pub tuned: FineTuned,
     /// Where its first Gaussians came from.
     pub started: Start,
-    /// Number of views of the dataset that it was trained on.
+    /// Number of views that it was trained on.
     pub views: usize,
-    /// Views that it was trained on beside those of the dataset, whose images a deformation has drawn.
-    pub drawn: Vec<TrainingView>,
     /// The division of the views, in words.
     pub splits: String,
     /// Whether the user ended the training before its last step.
@@ -156,58 +145,12 @@ impl<'a> Training<'a> {
             .with(Key::of_images(&splits.validation)?)
             .and(&format!("{start:?} {tuning:?} {trained_with:?} {:?} {:?}", splits.train, splits.validation))
             .and(env!("CARGO_PKG_VERSION"));
-        let key = key.and(&format!("{} steps of deformation", settings.deformation));
         Ok(Self { settings, splits, views, trained_with, playback, cloud, key })
     }
 
     /// Returns the key of everything that the result depends on: images, cameras, settings, version.
     pub fn key(&self) -> Key {
         self.key
-    }
-
-    /// Returns the views that a deformation may draw into the folder of `store`.
-    fn drawing(&self, store: &Store) -> Option<Drawing> {
-        let seed = self.settings.start.seed;
-        (self.settings.deformation > 0).then(|| Drawing::new(&self.splits.train, store.folder(), seed))
-    }
-
-    /// Returns how many Gaussians a deformation leaves to begin with.
-    fn extent(&self) -> Extent {
-        let StartSettings { gaussians, degree, .. } = self.settings.start;
-        Extent { gaussians, degree, degree_t: self.settings.start.used_degree_t() }
-    }
-
-    /// Returns the views that a deformation has drawn, whose images are in the folder of `store`: no views if the settings want none, `None` if they are
-    /// missing.
-    pub(super) fn drawn(&self, store: &Store) -> Option<Vec<TrainingView>> {
-        match self.drawing(store) {
-            Some(drawing) => drawing.stored(store, self.key, self.extent()).map(|drawn| drawn.views),
-            None => Some(Vec::new()),
-        }
-    }
-
-    /// Trains a capture that deforms, and draws further views with it, unless an earlier run has; `None` if the settings want none.
-    fn draw(
-        &self,
-        headless: &mut Headless,
-        store: &Store,
-        progress: &mut dyn Progress,
-    ) -> Result<Option<Drawn>, OfflineError> {
-        let Self { settings: TrainSettings { start, deformation, .. }, splits, trained_with, key, .. } = self;
-        let Some(drawing) = self.drawing(store) else { return Ok(None) };
-        if let Some(drawn) = drawing.stored(store, *key, self.extent()) {
-            return Ok(Some(drawn));
-        }
-        let all = [&splits.train[..], drawing.views()].concat();
-        TrainingImages::require_room(&all, &splits.validation, headless)?;
-        let (train, room) = (splits.train.clone(), ImageRoom::of_system());
-        let images = TrainingImages::load(train, &splits.validation, trained_with, room, progress)?;
-        if start.environment > 0 && images.has_gaps() {
-            return Err(StartError::NoSurroundings.into());
-        }
-        let gaussians = (start.gaussians / PIECES).max(1);
-        let fit = fit(headless, &images, trained_with, gaussians, (*deformation, start.seed), progress)?;
-        drawing.draw(fit, &images, trained_with, self.extent(), (store, *key), progress).map(Some)
     }
 
     /// Trains the capture. Each better scene is written to `out`; the result is not. State is kept in `store`, from which a training with the
@@ -223,8 +166,6 @@ impl<'a> Training<'a> {
         progress: &mut dyn Progress,
     ) -> Result<TrainedCapture, OfflineError> {
         let capacity = self.settings.capacity();
-        require_room(headless, capacity, self.settings.start.degree, self.settings.start.degree_t)?;
-        let drawn = self.draw(headless, store, progress)?;
         let Self {
             settings: TrainSettings { start, tuning, save_every, .. },
             splits,
@@ -233,17 +174,13 @@ impl<'a> Training<'a> {
             playback,
             cloud,
             key,
-            ..
         } = self;
-        let (division, own) = (splits.to_string(), splits.train.len());
-        let (drawn, start_of_drawn) = drawn.map_or((Vec::new(), None), |drawn| (drawn.views, Some(drawn.start)));
-        let all = [&splits.train[..], &drawn].concat();
-        TrainingImages::require_room(&all, &splits.validation, headless)?;
-        let images = TrainingImages::load(all, &splits.validation, &trained_with, ImageRoom::of_system(), progress)?;
-        let (scene, started) = match start_of_drawn {
-            Some(native) => (begun(native, None, trained_with, playback), Start::Hull),
-            None => begin(&images, trained_with, playback, start, cloud.as_ref())?,
-        };
+        TrainingImages::require_room(&splits.train, &splits.validation, headless)?;
+        require_room(headless, capacity, start.degree, start.degree_t)?;
+        let division = splits.to_string();
+        let images =
+            TrainingImages::load(splits.train, &splits.validation, &trained_with, ImageRoom::of_system(), progress)?;
+        let (scene, started) = begin(&images, trained_with, playback, start, cloud.as_ref())?;
         let resume = Resume { store, key, every: *save_every };
         let (mut tuned, interrupted) = match train(headless, scene, &images, tuning, Some(resume), Some(out), progress)
         {
@@ -252,6 +189,6 @@ impl<'a> Training<'a> {
         };
         tuned.scene.trained_with.pixel = trained_pixel(&tuned.scene, &views);
         tuned.scene.trained_with.iteration = tuned.best.step as u64;
-        Ok(TrainedCapture { tuned, started, views: own, drawn, splits: division, interrupted })
+        Ok(TrainedCapture { tuned, started, views: images.len(), splits: division, interrupted })
     }
 }

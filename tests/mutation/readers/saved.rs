@@ -58,7 +58,6 @@ impl Saved {
             data,
             out,
             splits: SplitOptions::default(),
-            drawn: Vec::new(),
             background: None,
             goal: Goal::Keep(30),
             rounds: 1,
