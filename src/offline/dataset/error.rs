@@ -218,7 +218,7 @@ pub enum FrameProblem {
     Folded,
     /// The distortion of the camera model cannot be undone.
     #[error(
-        "camera_model is \"{0}\", whose distortion cannot be undone (PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV and OPENCV_FISHEYE can): \
+        "camera_model is \"{0}\", whose distortion cannot be undone (PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, OPENCV_FISHEYE and, of COLMAP, FULL_OPENCV and other fisheye lenses without prisms can): \
          {UNDISTORT}; then write PINHOLE"
     )]
     CameraModel(String),

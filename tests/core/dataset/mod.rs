@@ -2,11 +2,13 @@
 //!
 //! In: small camera files and images written to temporary folders; with `GS4D_DATA` set, trained captures. Out: proof
 //! that cameras in every form and their sizes are read as in the original; images, invalid files and trained captures
-//! are tested in [`images`], [`wrong`] and [`captures`], datasets of other programs in [`formats`].
+//! are tested in [`images`], [`wrong`] and [`captures`], datasets of other formats in [`formats`], and what other programs have
+//! written and measured in [`independent`].
 
 mod captures;
 mod formats;
 mod images;
+mod independent;
 mod wrong;
 
 use std::fs;

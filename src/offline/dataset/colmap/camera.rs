@@ -15,7 +15,7 @@ pub(super) struct ModelCamera {
 }
 
 /// The models of COLMAP by number: name, number of parameters, number of focal lengths.
-pub(super) const MODELS: [(&str, usize, usize); 11] = [
+pub(super) const MODELS: [(&str, usize, usize); 18] = [
     ("SIMPLE_PINHOLE", 3, 1),
     ("PINHOLE", 4, 2),
     ("SIMPLE_RADIAL", 4, 1),
@@ -27,6 +27,13 @@ pub(super) const MODELS: [(&str, usize, usize); 11] = [
     ("SIMPLE_RADIAL_FISHEYE", 4, 1),
     ("RADIAL_FISHEYE", 5, 1),
     ("THIN_PRISM_FISHEYE", 12, 2),
+    ("RAD_TAN_THIN_PRISM_FISHEYE", 16, 2),
+    ("SIMPLE_DIVISION", 4, 1),
+    ("DIVISION", 5, 2),
+    ("SIMPLE_FISHEYE", 3, 1),
+    ("FISHEYE", 4, 2),
+    ("EUCM", 6, 2),
+    ("EQUIRECTANGULAR", 2, 0),
 ];
 
 impl ModelCamera {
@@ -53,7 +60,7 @@ impl ModelCamera {
             ("FULL_OPENCV", &[k1, k2, p1, p2, k3, k4, k5, k6]) => {
                 distortion(false, &[k1, k2, k3], [p1, p2], [k4, k5, k6])
             }
-            ("OPENCV_FISHEYE" | "SIMPLE_RADIAL_FISHEYE" | "RADIAL_FISHEYE", radial) => {
+            ("OPENCV_FISHEYE" | "SIMPLE_RADIAL_FISHEYE" | "RADIAL_FISHEYE" | "SIMPLE_FISHEYE" | "FISHEYE", radial) => {
                 distortion(true, radial, none, [0.0; 3])
             }
             _ => return Err(FrameProblem::CameraModel(name.to_owned()).to_string()),
