@@ -12,6 +12,8 @@
 //! * drop a capture on the window, a file of any format or the folder of a sequence: play it; if it cannot be read, the panel shows the
 //!   reason
 //!
+//! A capture whose file changes is loaded again, so that the output of a running `gs4d train` is shown as it becomes better.
+//!
 //! With `--headless FOLDER`, or without a display, it writes N (8) pictures to FOLDER (`out`) instead, without the panel.
 
 mod common;
@@ -19,11 +21,14 @@ mod common;
 mod controls;
 #[path = "play/drop.rs"]
 mod drop;
+#[path = "play/live.rs"]
+mod live;
 
 use bevy::asset::UnapprovedPathMode;
 use bevy::core_pipeline::tonemapping::Tonemapping;
 use bevy::input::mouse::AccumulatedMouseMotion;
 use bevy::prelude::*;
+use bevy::time::common_conditions::on_real_timer;
 use bevy::window::PrimaryWindow;
 use bevy_egui::input::{egui_wants_any_keyboard_input, egui_wants_any_pointer_input};
 use bevy_gs4d::Upright;
@@ -36,6 +41,7 @@ use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin};
 use common::Orbit;
 use controls::{follow, mouse};
 use drop::drop_file;
+use live::reload_changed;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -51,9 +57,11 @@ struct Marker;
 
 /// Maximum motion of the mouse during a click, in pixels.
 const CLICK: f32 = 4.0;
+/// Time between two looks at the file of the capture.
+const LOOK_AGAIN: Duration = Duration::from_millis(500);
 
 fn main() -> Result {
-    let arguments = controls::arguments("toybox.gs4d")?;
+    let arguments = controls::arguments("island.gs4d")?;
     let capture = Capture(common::asset_path(&arguments.file));
     match arguments.headless {
         Some(folder) => {
@@ -69,7 +77,8 @@ fn main() -> Result {
             scene(&mut app, capture);
             let keys = keys.run_if(not(egui_wants_any_keyboard_input));
             let mouse = (mouse, pick).run_if(not(egui_wants_any_pointer_input));
-            app.add_plugins(InspectorPlugin).add_systems(Update, (drop_file, keys, mouse).before(follow)).run();
+            let reload = reload_changed.run_if(on_real_timer(LOOK_AGAIN));
+            app.add_plugins(InspectorPlugin).add_systems(Update, (drop_file, keys, mouse, reload).before(follow)).run();
             Ok(())
         }
     }

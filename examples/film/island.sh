@@ -12,7 +12,7 @@ folder=${1:-island}
 [ $# -eq 0 ] || shift
 film() { ${FILM:-cargo run --release --features viewer,cli --example film --} "$@"; }
 gs4d() { ${GS4D:-cargo run --release --features viewer,cli --bin gs4d --} "$@"; }
-read -ra bake <<<"${BAKE:---gaussians 90000 --train-steps 30000 --target-size 2.5}"
+read -ra bake <<<"${BAKE:---gaussians 90000 --train-steps 20000 --target-size 2.5}"
 
 mkdir -p "$folder"
 film "$folder/dataset" "$@"

@@ -25,6 +25,7 @@ mod picking_backend;
 mod playback;
 mod processed;
 mod released;
+mod replaced_file;
 mod shade;
 mod shadows;
 mod steady;
