@@ -182,6 +182,10 @@ pub mod offline {
     }
     /// Datasets.
     pub mod dataset {
+        /// What times mean.
+        pub mod clock {
+            pub use crate::offline::dataset::clock::*;
+        }
         /// Pictures of cameras.
         pub mod drawing {
             pub use crate::offline::dataset::drawing::*;

@@ -63,7 +63,7 @@ pub(super) struct Bake {
     input: PathBuf,
     #[command(flatten)]
     package: PackageArgs,
-    /// Folder of the dataset, with `transforms_train.json` and `transforms_test.json`, unless it is the INPUT.
+    /// Folder of the dataset (Blender, D-NeRF, nerfstudio, N3V or COLMAP), unless it is the INPUT.
     #[arg(long, help_heading = "Data", value_name = "DIR")]
     data: Option<PathBuf>,
     /// Divisor of the picture size (1, 2, 3, 4, 8), -1 (at most 1600 wide) or a target width, as in training.

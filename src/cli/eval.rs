@@ -165,11 +165,12 @@ impl Eval {
             }
             Portion::Shard(shard) => {
                 let out = self.shards.out(self.out.as_deref())?;
-                let written = subject.write_part(out, &subject.label(&engine, shard)?, &mut engine, progress)?;
+                let written =
+                    subject.write_part(out, &subject.label(&engine, shard, progress)?, &mut engine, progress)?;
                 let work = written.then(|| (start.elapsed().as_secs_f64(), engine.name()));
                 return Ok(part_report(shard, out, work));
             }
-            Portion::Parts(paths) => merge(paths, &subject.label(&engine, Shard::WHOLE)?, views.len())?,
+            Portion::Parts(paths) => merge(paths, &subject.label(&engine, Shard::WHOLE, progress)?, views.len())?,
         };
         let seconds = start.elapsed().as_secs_f64();
 

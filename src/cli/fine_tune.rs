@@ -139,8 +139,8 @@ impl FineTune {
             progress,
         )?;
         let key = Key::of_files(&[&self.input])?
-            .with(Key::of_images(&splits.train)?)
-            .with(Key::of_images(&splits.validation)?)
+            .with(Key::of_images(&splits.train, progress)?)
+            .with(Key::of_images(&splits.validation, progress)?)
             .and(&format!("{:?} {:?} {:?}", scene.trained_with, splits.train, splits.validation))
             .and(env!("CARGO_PKG_VERSION"));
         let resume = Resume { store: &store, key, every: self.save_every };

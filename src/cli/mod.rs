@@ -57,7 +57,7 @@ const FAILED: u8 = 2;
 /// The exit code after a panic, a defect of this crate.
 const PANICKED: u8 = 101;
 
-/// Dynamic captures (native 4D Gaussian Splatting): look into them, convert, render, compare, time, make smaller.
+/// Dynamic captures (native 4D Gaussian Splatting): train them from pictures, look into them, convert, render, compare, time, make smaller.
 #[derive(Parser)]
 #[command(name = "gs4d", version, propagate_version = true, after_help = EXAMPLES)]
 struct Cli {
@@ -71,7 +71,8 @@ struct Cli {
 const EXAMPLES: &str = "\
 Examples:
   gs4d info chkpnt30000.pth
-  gs4d convert chkpnt30000.pth capture.gs4d --form runtime
+  gs4d bake pictures -o capture.gs4d                    # from a dataset: trains, prunes, compresses
+  gs4d bake chkpnt30000.pth --data pictures -o capture.gs4d
   gs4d render capture.gs4d --orbit 60 --out frames
 
 Every verb explains itself: gs4d VERB --help. Exit codes: 0 done, 2 failed, 130 interrupted, 143 terminated.";

@@ -33,6 +33,7 @@ Examples:
   gs4d train --data data/hook --resolution 2 --gaussians 30000 --steps 10000 -o small.gs4d
   gs4d train --data data/hook --resolution 2 --densify original --gaussians 200000 -o original.gs4d
   gs4d train --data data/cameras --exposure -o even.gs4d     # cameras of different exposure or white balance
+  gs4d train --data data/n3v --resolution 2 -o n3v.gs4d      # poses_bounds.npy with a video of each camera
 
 The result is as large as a checkpoint: gs4d bake prunes and compresses it.")]
 pub(super) struct Train {
@@ -42,13 +43,16 @@ pub(super) struct Train {
     package: PackageArgs,
     #[command(flatten)]
     data: SplitArgs,
-    /// The views that the best step is chosen on, which nothing is trained on: those of `transforms_val.json` (file), whole cameras, blocks of
+    /// The views that the best step is chosen on, which nothing is trained on: those of the dataset's own split `val` (file), whole cameras, blocks of
     /// time (times), or none; auto takes the first of these that the data allows.
     #[arg(long, help_heading = "Validation", value_name = "VIEWS", default_value = "auto", value_parser = values::one_of(&Validation::NAMES))]
     validation: Validation,
     /// First and last time of the capture [default: 0,1 if no view is outside, else from the first view to the last].
     #[arg(long, value_name = "T0,T1", value_parser = values::interval, allow_hyphen_values = true)]
     time_interval: Option<[f32; 2]>,
+    /// Seconds of one pass through the time interval at speed 1, 0 for a still [default: as the dataset says, else the interval's length].
+    #[arg(long, value_name = "SECONDS", value_parser = values::seconds)]
+    duration: Option<f32>,
     /// Background color, 0 to 1 in the space of the pictures.
     #[arg(long, value_name = "R,G,B", default_value = "0,0,0", value_parser = values::color, allow_hyphen_values = true)]
     background: [f32; 3],
@@ -121,7 +125,7 @@ pub(super) struct Train {
     /// Steps between two evaluations on the validation views.
     #[arg(long, value_name = "N", default_value = "1000", value_parser = values::count(1_000_000))]
     evaluate_every: usize,
-    /// Steps between two saved states, rounded up to the next evaluation.
+    /// Steps between two saved states, rounded up to the next evaluation; the first evaluation after a minute without one saves a state, too.
     #[arg(long, value_name = "N", default_value = "5000", value_parser = values::count(1_000_000))]
     save_every: usize,
     #[command(flatten)]
@@ -200,6 +204,7 @@ impl Train {
             "validation": validation,
             "split": splits,
             "time_interval": scene.trained_with.time_interval,
+            "duration_seconds": scene.playback.duration_seconds,
             "best": best,
             "psnr": best.psnr,
             "curve": curve,
@@ -253,7 +258,11 @@ impl Train {
         TrainSettings {
             data: self.data.data.clone(),
             splits: self.data.options(self.validation),
-            capture: CaptureSettings { time_interval: self.time_interval, background: self.background },
+            capture: CaptureSettings {
+                time_interval: self.time_interval,
+                background: self.background,
+                duration_seconds: self.duration,
+            },
             start: self.start_settings(),
             points: self.points.clone(),
             tuning: self.tuning(),

@@ -42,9 +42,15 @@ pub enum OfflineError {
     /// A scene cannot be fine-tuned.
     #[error(transparent)]
     Train(#[from] TrainerError),
-    /// No capture can be trained on these views.
-    #[error(transparent)]
-    Start(#[from] StartError),
+    /// No capture can be trained on the views of a dataset.
+    #[error("{}: {reason}", .path.display())]
+    Start {
+        /// The dataset.
+        path: PathBuf,
+        /// Why not.
+        #[source]
+        reason: StartError,
+    },
     /// A Gaussian cannot be drawn.
     #[error(transparent)]
     Invalid(#[from] InvalidGaussian),
@@ -188,6 +194,11 @@ fn pictures(count: u64, UVec2 { x, y }: UVec2) -> String {
 }
 
 impl OfflineError {
+    /// Returns the error of a dataset that no capture can be trained on.
+    pub(super) fn about(dataset: &Path, reason: StartError) -> Self {
+        Self::Start { path: dataset.to_owned(), reason }
+    }
+
     /// Returns an error about the file `path`. `reason` is an error that does not name the file, or a message.
     pub(super) fn at(path: &Path, reason: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
         Self::File { path: path.to_owned(), reason: reason.into() }

@@ -73,7 +73,12 @@ impl Subject<'_> {
     ///
     /// # Errors
     /// The scene or an image cannot be read.
-    pub(crate) fn label(&self, engine: &Engine, shard: Shard) -> Result<Label, OfflineError> {
+    pub(crate) fn label(
+        &self,
+        engine: &Engine,
+        shard: Shard,
+        progress: &mut dyn Progress,
+    ) -> Result<Label, OfflineError> {
         let Self { scene, views, background, metrics, .. } = self;
         let read = format!("{:?} {:?} {background:?}", scene.trained_with, scene.playback);
         Ok(Label::new("eval", shard)
@@ -81,7 +86,7 @@ impl Subject<'_> {
             .with("reading of the scene", Key::of(read.as_bytes()))
             .with("use of the filter", scene.filter.is_some())
             .with("set of views", Key::of_views(views))
-            .with("set of images", Key::of_images(views)?)
+            .with("set of images", Key::of_images(views, progress)?)
             .with("set of metrics", format!("{metrics:?}"))
             .with("engine", engine.kind()))
     }

@@ -8,7 +8,7 @@
 use super::OfflineError;
 use super::dataset::selection::even_subset;
 use super::dataset::validation::{HeldOut, Validation, hold_out};
-use super::dataset::{CameraOptions, Dataset, DatasetError, Split, TrainingView};
+use super::dataset::{CameraOptions, Clock, Dataset, DatasetError, Split, TrainingView};
 use super::progress::Progress;
 use crate::scene::TrainedWith;
 use glam::UVec2;
@@ -50,6 +50,8 @@ pub struct Splits {
     pub held_out: usize,
     /// File of points to begin training with, if the dataset names or has one. It may not exist.
     pub points: Option<PathBuf>,
+    /// What the times of the views mean.
+    pub(crate) clock: Clock,
     folder: PathBuf,
     options: SplitOptions,
 }
@@ -65,7 +67,7 @@ impl Splits {
         trained_with: &TrainedWith,
         progress: &mut dyn Progress,
     ) -> Result<Self, OfflineError> {
-        let Dataset { views, points, .. } = open_split(folder, Split::Train, options, trained_with, progress)?;
+        let Dataset { views, points, clock, .. } = open_split(folder, Split::Train, options, trained_with, progress)?;
         let HeldOut { train, validation, by } = match Self::of_file(folder, options, trained_with, progress)? {
             Some(validation) => HeldOut { train: views, validation, by: Validation::File },
             None => hold_out(&views, options.validation).ok_or_else(|| {
@@ -79,10 +81,11 @@ impl Splits {
         };
         let held_out = validation.len();
         let validation = subset(validation, Some(MEASURED));
-        Ok(Self { train, validation, by, held_out, points, folder: folder.to_owned(), options: *options })
+        let (folder, options) = (folder.to_owned(), *options);
+        Ok(Self { train, validation, by, held_out, points, clock, folder, options })
     }
 
-    /// Returns the views of `transforms_val.json` if they are to be used: the file is there with its images, is wanted,
+    /// Returns the views of the dataset's own split `val` if they are to be used: it is there with its images, is wanted,
     /// and is not what the original tests on.
     fn of_file(
         folder: &Path,
@@ -143,7 +146,7 @@ impl fmt::Display for Splits {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (train, held_out, measured) = (self.train.len(), self.held_out, self.validation.len());
         let by = match self.by {
-            Validation::File => "of transforms_val.json",
+            Validation::File => "of the dataset's own split val",
             Validation::Cameras => "of whole cameras held out",
             Validation::Times => "of blocks of time held out",
             Validation::Auto | Validation::None => return write!(f, "{train} views to train on, none to validate on"),
@@ -165,7 +168,7 @@ pub fn open_split(
     progress: &mut dyn Progress,
 ) -> Result<Dataset, DatasetError> {
     let options = CameraOptions { size: options.size, resolution: options.resolution, time_interval: None };
-    let all = Dataset::open(folder, split, &options)?;
+    let all = Dataset::open_telling(folder, split, &options, progress)?;
     let [first, last] = trained_with.time_interval;
     let outside = all.views.iter().filter(|view| !(first..=last).contains(&view.time)).count();
     if outside == 0 {

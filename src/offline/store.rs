@@ -38,6 +38,8 @@ const ATTEMPTS: usize = 100;
 const MOMENT: Duration = Duration::from_millis(2);
 /// Time between two looks whether another run still works on a stage.
 const WAIT: Duration = Duration::from_millis(20);
+/// Images that are hashed between two reports of progress.
+const AT_ONCE: usize = 256;
 
 /// The identity of everything that a result depends on: a BLAKE3 hash of the contents of files, results and settings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,11 +60,11 @@ impl Key {
         Ok(hashes.into_iter().fold(Self::of(b"files"), Self::with))
     }
 
-    /// Returns the key of the contents of the images and masks of these views. A file that is missing counts as such.
+    /// Returns the key of the contents of the images and masks of these views. A file that is missing counts as such. Begins the task "hashing images".
     ///
     /// # Errors
     /// The first file that cannot be read although it is there, by name.
-    pub fn of_images(views: &[TrainingView]) -> Result<Self, CodecError> {
+    pub fn of_images(views: &[TrainingView], progress: &mut dyn Progress) -> Result<Self, CodecError> {
         let paths: Vec<&Path> = views
             .iter()
             .flat_map(|view| [Some(&view.image), view.mask.as_ref()])
@@ -70,7 +72,13 @@ impl Key {
             .map(PathBuf::as_path)
             .collect();
         let hash = |path: &&Path| if path.is_file() { Self::of_file(path) } else { Ok(Self::of(b"missing")) };
-        let hashes: Vec<Self> = paths.par_iter().map(hash).collect::<Result<_, _>>()?;
+        let mut hashes = Vec::new();
+        progress.begin("hashing images", paths.len());
+        for some in paths.chunks(AT_ONCE) {
+            hashes.extend(some.par_iter().map(hash).collect::<Result<Vec<Self>, _>>()?);
+            some.iter().for_each(|_| progress.advance());
+        }
+        progress.finish();
         let corrected =
             views.iter().map(|view| view.correction).filter(|correction| *correction != Correction::default());
         let corrected = corrected.map(|correction| Self::of(format!("{correction:?}").as_bytes()));

@@ -236,6 +236,23 @@ fn a_bake_trains_exposures_and_an_environment_map_on_request() {
 }
 
 #[test]
+fn the_duration_is_that_of_the_film_unless_given() {
+    let Some(capture) = dataset() else { return };
+    let path = capture.data.join("transforms_train.json");
+    let mut json: Value = serde_json::from_str(&fs::read_to_string(&path).expect("a camera file")).expect("JSON");
+    json["seconds"] = json!([1.5, 5.5]);
+    fs::write(&path, json.to_string()).expect("the folder can be written to");
+    let out = capture.path("out.gs4d");
+    let seconds = |more: &[&str]| {
+        let command = arguments!["train", "--data", &capture.data, "-o", &out, "--gaussians", "50", "--sh-degree", "0"];
+        let short = ["--steps", "2", "--validation", "none", "--json"].iter().chain(more).map(Into::into);
+        gs4d(&[command.to_vec(), short.collect()].concat()).json()["duration_seconds"].as_f64()
+    };
+    assert_eq!(seconds(&[]), Some(4.0), "from the seconds of the film");
+    assert_eq!(seconds(&["--duration", "2.5"]), Some(2.5), "as given");
+}
+
+#[test]
 fn silhouettes_of_other_poses_are_named_as_the_cause() {
     let Some(capture) = dataset() else { return };
     // Every camera looks at the middle, and has its object in a corner.
@@ -244,7 +261,9 @@ fn silhouettes_of_other_poses_are_named_as_the_cause() {
         corner.save(path.expect("an image").path()).expect("the folder can be written to");
     }
     let out = capture.path("out.gs4d");
-    let command = arguments!["train", "--data", &capture.data, "-o", &out, "--steps", "2", "--start", "hull"];
-    gs4d(&command).must_fail("masks or poses of another scene?");
+    for start in ["auto", "hull"] {
+        let command = arguments!["train", "--data", &capture.data, "-o", &out, "--steps", "2", "--start", start];
+        gs4d(&command).must_fail("masks or poses of another scene?");
+    }
     assert!(!out.exists(), "no package is written");
 }

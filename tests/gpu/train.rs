@@ -8,6 +8,7 @@
 use crate::support::blob::blob;
 use crate::support::{dataset, gpu};
 use bevy_gs4d::gaussian::{Gaussian, GradientMode, Harmonics, Parameters};
+use bevy_gs4d::internal::offline::dataset::clock::Clock;
 use bevy_gs4d::internal::offline::dataset::selection::camera_numbers;
 use bevy_gs4d::internal::offline::fine_tune::{
     Cloning, CloningStep, FREE, Sample, StepGrowth, Terms, Trainer, TrainerState, densify, is_dropped, is_free, loss,
@@ -409,7 +410,8 @@ impl Lesson {
         out: Option<&Path>,
         progress: &mut dyn Progress,
     ) -> Result<FineTuned, Box<OfflineError>> {
-        let (trained_with, playback) = capture_of(&self.all, &CaptureSettings::default()).expect("ten places");
+        let (trained_with, playback) =
+            capture_of(&self.all, &CaptureSettings::default(), Clock::default()).expect("ten places");
         let Splits { train: views, validation, .. } = &self.splits;
         let images =
             TrainingImages::load(views.clone(), validation, &trained_with, ImageRoom::of_system(), &mut NoProgress);

@@ -46,8 +46,8 @@ pub(crate) struct CheckpointArgs {
     /// Axis that points up; also instead of a package's own [default: +z].
     #[arg(long, value_name = "AXIS", value_parser = values::one_of(&UP_AXES), allow_hyphen_values = true)]
     up: Option<UpAxis>,
-    /// Seconds of one pass through the time interval at speed 1, 0 for a still; also instead of a package's own [default: the
-    /// interval's length].
+    /// Seconds of one pass through the time interval at speed 1, 0 for a still; also instead of a package's own or a dataset's [default:
+    /// the interval's length].
     #[arg(long, value_name = "SECONDS", value_parser = values::seconds)]
     duration: Option<f32>,
     /// Marginal at and below which a Gaussian is not drawn, 1/255 to 1; also instead of a package's own [default: what the format has, 0.05 for
@@ -80,7 +80,7 @@ const UP_AXES: [(&str, UpAxis); 6] = [
 
 impl CheckpointArgs {
     /// The options that have an effect on checkpoints and packages alone, not on captures trained from pictures.
-    pub(crate) const OF_CHECKPOINTS: [&str; 11] = [
+    pub(crate) const OF_CHECKPOINTS: [&str; 10] = [
         "--rotation-convention",
         "--raster-fov",
         "--trained-cameras",
@@ -88,7 +88,6 @@ impl CheckpointArgs {
         "--force-sh-3d",
         "--prefilter-var",
         "--up",
-        "--duration",
         "--cutoff",
         "--fps",
         "--tolerance",
@@ -97,7 +96,7 @@ impl CheckpointArgs {
     /// Returns the settings of a capture that is trained from pictures.
     pub(crate) fn capture(&self) -> CaptureSettings {
         let background = self.background.unwrap_or_default();
-        CaptureSettings { time_interval: self.time_interval, background }
+        CaptureSettings { time_interval: self.time_interval, background, duration_seconds: self.duration }
     }
 
     /// Opens a capture of any format, and notes what of it the scene does not show.

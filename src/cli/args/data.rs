@@ -17,8 +17,8 @@ use std::path::{Path, PathBuf};
 #[derive(clap::Args)]
 #[command(next_help_heading = "Training data")]
 pub(crate) struct DataArgs {
-    /// Folder of the data the capture was trained on, with `transforms_train.json`. Cameras and times are enough unless results
-    /// are compared with the images.
+    /// Folder of the dataset that the capture was trained on: `transforms_train.json` (Blender, D-NeRF), `transforms.json` (nerfstudio),
+    /// `poses_bounds.npy` (N3V) or `sparse/0` (COLMAP). Cameras and times are enough unless results are compared with the images.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
     /// Picture size [default: w and h of the camera file, else that of the first image found beside it, after --resolution].
@@ -82,7 +82,7 @@ impl DataArgs {
 #[derive(Debug, Clone, Copy, clap::Args)]
 #[command(next_help_heading = "Validation")]
 pub(crate) struct ValidationArgs {
-    /// The views that every choice is made on, which nothing is trained on before: those of `transforms_val.json` (file), whole cameras, blocks
+    /// The views that every choice is made on, which nothing is trained on before: those of the dataset's own split `val` (file), whole cameras, blocks
     /// of time (times), or none; auto takes the first of these that the data allows.
     #[arg(long, value_name = "VIEWS", default_value = "auto", value_parser = values::one_of(&Validation::NAMES))]
     pub validation: Validation,
@@ -103,7 +103,8 @@ pub(super) fn or_give_size(error: DatasetError) -> Failure {
 #[derive(clap::Args)]
 #[command(next_help_heading = "Data")]
 pub(crate) struct SplitArgs {
-    /// Folder of the dataset, with `transforms_train.json` and `transforms_test.json`.
+    /// Folder of the dataset, with `transforms_train.json` and `transforms_test.json` (Blender, D-NeRF), `transforms.json` (nerfstudio),
+    /// `poses_bounds.npy` (N3V) or `sparse/0` (COLMAP); gs4d info DIR describes it.
     #[arg(long, value_name = "DIR")]
     pub data: PathBuf,
     /// Divisor of the picture size (1, 2, 3, 4, 8), -1 (at most 1600 wide) or a target width, as in training.

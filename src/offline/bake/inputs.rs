@@ -64,7 +64,8 @@ impl<'a> Inputs<'a> {
         let read = format!("{:?} {:?} {:?}", scene.trained_with, scene.playback, settings.background);
         let scene_key = Key::of_files(&[checkpoint])?.and(env!("CARGO_PKG_VERSION")).and(&read);
         let cameras_key = Key::of(format!("{:?} {:?}", splits.train, splits.validation).as_bytes());
-        let image_keys = [Key::of_images(&splits.train)?, Key::of_images(&splits.validation)?];
+        let trained = Key::of_images(&splits.train, progress)?;
+        let image_keys = [trained, Key::of_images(&splits.validation, progress)?];
         require_room(engine, settings, &views, &splits)?;
         let mut subject = Subject::new(checkpoint, scene, settings.background)?;
         let pixel = trained_pixel(&subject.scene, &views);

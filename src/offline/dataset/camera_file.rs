@@ -12,6 +12,7 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::camera_options::{CameraOptions, check_size};
+use super::clock::Clock;
 use super::distortion::Distortion;
 use super::frame::{Frame, Mask, output_name};
 use super::lens::{LensEntries, OriginalLens, check_centered, check_pinhole, checked_size, distortion};
@@ -143,8 +144,9 @@ impl CameraFile {
     fn frames(&self) -> Result<Vec<Parsed>, DatasetError> {
         let shared = LensEntries::deserialize(&self.json)
             .map_err(|reason| DatasetError::Json { path: self.path.clone(), reason })?;
+        let first = self.first_number().unwrap_or(0.0);
         let parse = |entry| match self.form {
-            Form::Transforms => transforms_frame(entry, &shared, &self.json),
+            Form::Transforms => transforms_frame(entry, &shared, &self.json, first),
             Form::Golden => golden_frame(entry, &self.json),
         };
         self.entries()
@@ -203,12 +205,15 @@ impl CameraFile {
         if let Some(mask) = frame.mask.as_deref().filter(|mask| mask.contains(is_obeyed)) {
             return Err(unnamed(mask));
         }
-        let beside = self.is_single().then(|| masks::beside(self.folder(), Path::new(&file))).flatten();
+        let has_masks = self.form == Form::Transforms;
+        let beside = has_masks.then(|| masks::beside(self.folder(), Path::new(&file))).flatten();
+        // Images of the Blender form have been multiplied by the masks that their frames name.
         let named = frame.mask.map(|mask| self.folder().join(with_image_extension(&mask)));
+        let applied = named.is_some() && !self.is_single();
         let frame = Frame {
             name,
             image: self.folder().join(file),
-            mask: named.or(beside).map(|path| Mask { path, applied: !self.is_single() }),
+            mask: named.or(beside).map(|path| Mask { path, applied }),
             time: frame.time,
             world_to_camera: frame.world_to_camera,
             lens: frame.lens,
@@ -218,9 +223,32 @@ impl CameraFile {
         frame.into_view(original, options, reducible, |problem| self.frame_error(index, problem))
     }
 
-    /// Returns whether this is the single file of a nerfstudio dataset, whose images have not been multiplied by their masks.
+    /// Returns whether this is the single file of a nerfstudio dataset.
     fn is_single(&self) -> bool {
         self.form == Form::Transforms && self.path.file_name().is_some_and(|name| name == SINGLE)
+    }
+
+    /// Returns what the times mean: films have the entry `seconds`, the seconds of the times 0 and 1; frames of a single file may have numbers in place
+    /// of times.
+    pub(super) fn clock(&self) -> Clock {
+        let seconds = self.entry("seconds").and_then(|entry| <[f32; 2]>::deserialize(entry).ok());
+        let length = seconds.map(|[first, last]| last - first).filter(|length| length.is_finite() && *length > 0.0);
+        match length {
+            Some(unit_seconds) => Clock { unit_seconds, is_numbered: false },
+            None if self.first_number().is_some() => Clock::NUMBERED,
+            None => Clock::default(),
+        }
+    }
+
+    /// Returns the least number of a frame, which is time 0, if the frames of a single file have numbers and no times. Files of splits have no first
+    /// number in common.
+    fn first_number(&self) -> Option<f64> {
+        let is_timed = |entry: &Value| entry.get("time").is_some_and(|time| !time.is_null());
+        if !self.is_single() || self.entries().iter().any(is_timed) {
+            return None;
+        }
+        let numbers = self.entries().iter().filter_map(|entry| entry.get("frame_number")?.as_f64());
+        numbers.reduce(f64::min)
     }
 
     /// Returns an entry of the whole file.
@@ -252,17 +280,19 @@ impl Form {
     }
 }
 
-fn transforms_frame(entry: &Value, shared: &LensEntries, file: &Value) -> Result<Parsed, FrameProblem> {
+/// Reads a frame of the Blender form. The number `first` is time 0.
+fn transforms_frame(entry: &Value, shared: &LensEntries, file: &Value, first: f64) -> Result<Parsed, FrameProblem> {
     let frame = TransformsFrame::deserialize(entry).map_err(FrameProblem::Malformed)?;
     let entries = LensEntries::deserialize(entry).map_err(FrameProblem::Malformed)?.or(shared);
     let mut camera_to_world = pose(&frame.transform_matrix)?;
     // OpenGL axes to OpenCV axes: the camera's y and z are negated.
     camera_to_world.y_axis = -camera_to_world.y_axis;
     camera_to_world.z_axis = -camera_to_world.z_axis;
+    let by_number = frame.frame_number.map(|number| (number - first) / FRAME_RATE);
     Ok(Parsed {
         file: frame.file_path,
         mask: frame.mask_path,
-        time: finite_time(frame.time.or(frame.frame_number.map(|number| number / FRAME_RATE)).unwrap_or(0.0))?,
+        time: finite_time(frame.time.or(by_number).unwrap_or(0.0))?,
         world_to_camera: single_precision(camera_to_world.inverse())?,
         size: entries.size()?,
         lens: entries.lens()?,

@@ -4,6 +4,7 @@
 
 use super::camera_file::CameraFile;
 use super::camera_options::{CameraOptions, check_size};
+use super::clock::Clock;
 use super::division::divide;
 use super::error::DatasetError;
 use super::files::require_files;
@@ -12,6 +13,7 @@ use super::point_cloud::BESIDE;
 use super::split::Split;
 use super::video::Videos;
 use super::view::TrainingView;
+use crate::offline::{NoProgress, Progress};
 use std::path::{Path, PathBuf};
 
 /// One split of a dataset folder.
@@ -25,6 +27,8 @@ pub struct Dataset {
     pub views: Vec<TrainingView>,
     /// File of points to begin training with, if the dataset names or has one. It may not exist.
     pub points: Option<PathBuf>,
+    /// What the times of the views mean.
+    pub(crate) clock: Clock,
 }
 
 impl Dataset {
@@ -33,7 +37,20 @@ impl Dataset {
     /// # Errors
     /// [`DatasetError`] if the folder has no such split, or its files are unusable. Missing images are not an error here.
     pub fn open(folder: &Path, split: Split, options: &CameraOptions) -> Result<Self, DatasetError> {
-        Self::open_as(folder, split, options, Videos::Decode)
+        Self::open_telling(folder, split, options, &mut NoProgress)
+    }
+
+    /// Reads as [`open`](Self::open). Begins the task "decoding" for each video that is decoded.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub(crate) fn open_telling(
+        folder: &Path,
+        split: Split,
+        options: &CameraOptions,
+        progress: &mut dyn Progress,
+    ) -> Result<Self, DatasetError> {
+        Self::open_as(folder, split, options, Videos::Decode(progress))
     }
 
     /// Reads as [`open`](Self::open), but decodes no video: a video is the image of the only view of its camera.
@@ -44,7 +61,7 @@ impl Dataset {
         Self::open_as(folder, split, options, Videos::Leave)
     }
 
-    fn open_as(folder: &Path, split: Split, options: &CameraOptions, videos: Videos) -> Result<Self, DatasetError> {
+    fn open_as(folder: &Path, split: Split, options: &CameraOptions, videos: Videos<'_>) -> Result<Self, DatasetError> {
         options.size.map_or(Ok(()), check_size)?;
         let Format { reader, .. } = format::of(folder).ok_or_else(|| not_a_dataset(folder, split))?;
         match reader {
@@ -52,7 +69,8 @@ impl Dataset {
             Reader::Whole(read) => {
                 let all = read(folder, options, videos)?;
                 let points = all.points.clone();
-                Ok(Self { folder: folder.to_owned(), split, views: divide(split, options, all)?, points })
+                let clock = all.clock;
+                Ok(Self { folder: folder.to_owned(), split, views: divide(split, options, all)?, points, clock })
             }
         }
     }
@@ -65,7 +83,9 @@ impl Dataset {
             return Err(DatasetError::NoSplit { folder: folder.to_owned(), file: split.file_name() });
         }
         let points = Some(folder.join(BESIDE)).filter(|points| points.is_file());
-        Ok(Self { folder: folder.to_owned(), split, views: CameraFile::load(&path, options)?, points })
+        let file = CameraFile::read(&path)?;
+        let (views, clock) = (file.views(options)?, file.clock());
+        Ok(Self { folder: folder.to_owned(), split, views, points, clock })
     }
 
     /// Returns whether a folder has views of a split.

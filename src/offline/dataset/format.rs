@@ -23,7 +23,7 @@ pub(super) enum Reader {
     /// A camera file for each split.
     Splits,
     /// All views at once.
-    Whole(fn(&Path, &CameraOptions, Videos) -> Result<Undivided, DatasetError>),
+    Whole(fn(&Path, &CameraOptions, Videos<'_>) -> Result<Undivided, DatasetError>),
 }
 
 /// Every format.

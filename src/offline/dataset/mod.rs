@@ -19,6 +19,7 @@
 
 mod camera_file;
 mod camera_options;
+pub(crate) mod clock;
 mod cloud_point;
 mod colmap;
 mod dataset_split;
@@ -50,6 +51,7 @@ mod view;
 
 pub use camera_file::CameraFile;
 pub use camera_options::CameraOptions;
+pub(crate) use clock::Clock;
 pub use dataset_split::Dataset;
 pub(crate) use dataset_split::require_images;
 pub use error::{DatasetError, FrameProblem};

@@ -12,7 +12,7 @@ use super::numbered::{entries, images, number, times};
 use super::pose::{pose, single_precision};
 use super::undivided::Undivided;
 use super::video::Videos;
-use super::{CameraOptions, DatasetError, FrameProblem, Split, masks, npy, video};
+use super::{CameraOptions, Clock, DatasetError, FrameProblem, Split, masks, npy, video};
 use glam::{DVec2, Mat4, UVec2};
 use std::collections::{BTreeSet, HashSet};
 use std::fs::File;
@@ -25,8 +25,8 @@ pub(super) const POSES: &str = "poses_bounds.npy";
 const COLUMNS: usize = 17;
 /// Most bytes of the file.
 const MAX_BYTES: u64 = 1 << 24;
-/// Extension of videos.
-const VIDEO: &str = "mp4";
+/// Extensions of videos.
+const VIDEOS: [&str; 5] = ["mp4", "mov", "mkv", "webm", "avi"];
 
 /// A row of the file.
 struct Row {
@@ -42,7 +42,7 @@ pub(super) fn is_there(folder: &Path) -> bool {
 }
 
 /// Reads the views of a folder.
-pub(super) fn read(folder: &Path, options: &CameraOptions, videos: Videos) -> Result<Undivided, DatasetError> {
+pub(super) fn read(folder: &Path, options: &CameraOptions, mut videos: Videos<'_>) -> Result<Undivided, DatasetError> {
     let source = folder.join(POSES);
     let unusable = |reason: String| DatasetError::Unusable { path: source.clone(), reason };
     let failed = |frame: usize| {
@@ -67,7 +67,7 @@ pub(super) fn read(folder: &Path, options: &CameraOptions, videos: Videos) -> Re
     }
     let mut frames = Vec::new();
     for camera in &cameras {
-        frames.push(frames_of(folder, camera, videos)?);
+        frames.push(frames_of(folder, camera, &mut videos)?);
     }
     let decoded = frames.iter().flatten().filter(|frame| !is_video(frame));
     let first = decoded.filter_map(|frame| number(frame)).min().unwrap_or(0);
@@ -94,7 +94,7 @@ pub(super) fn read(folder: &Path, options: &CameraOptions, videos: Videos) -> Re
             splits.push(Some(if index == 0 { Split::Test } else { Split::Train }));
         }
     }
-    Ok(Undivided { source, views, splits: Some(splits), points: None })
+    Ok(Undivided { source, views, splits: Some(splits), clock: Clock::NUMBERED, points: None })
 }
 
 fn bytes(path: &Path) -> Result<Vec<u8>, DatasetError> {
@@ -141,11 +141,12 @@ fn cameras(folder: &Path) -> Result<BTreeSet<String>, DatasetError> {
 }
 
 fn is_video(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(VIDEO)) && path.is_file()
+    let extension = path.extension().unwrap_or_default();
+    VIDEOS.iter().any(|known| extension.eq_ignore_ascii_case(known)) && path.is_file()
 }
 
 /// Returns the frames of a camera. A video that is not decoded is its only frame.
-fn frames_of(folder: &Path, camera: &str, videos: Videos) -> Result<Vec<PathBuf>, DatasetError> {
+fn frames_of(folder: &Path, camera: &str, videos: &mut Videos<'_>) -> Result<Vec<PathBuf>, DatasetError> {
     let [own, frames, common] = ["", "frames", "images"].map(|inside| folder.join(inside).join(camera));
     for place in [own.clone(), own.join("images"), frames, common] {
         let found = images(&place)?;
@@ -159,7 +160,7 @@ fn frames_of(folder: &Path, camera: &str, videos: Videos) -> Result<Vec<PathBuf>
         return Err(DatasetError::Unusable { path: own, reason });
     };
     match videos {
-        Videos::Decode => video::frames(folder, &video, camera),
+        Videos::Decode(progress) => video::frames(folder, &video, camera, &mut **progress),
         Videos::Leave => Ok(video::decoded(folder, camera)?.unwrap_or_else(|| vec![video])),
     }
 }

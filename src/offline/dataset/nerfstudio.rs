@@ -46,7 +46,7 @@ pub(super) fn read(folder: &Path, options: &CameraOptions) -> Result<Undivided, 
         return Err(DatasetError::Unusable { path: source, reason });
     }
     let points = points.map(|path| folder.join(path));
-    Ok(Undivided { source, views, splits, points })
+    Ok(Undivided { source, views, splits, clock: file.clock(), points })
 }
 
 /// Returns a path without `./` before it.

@@ -2,7 +2,7 @@
 //!
 //! In: what the reader of a format finds. Out: views of all splits, before they are divided.
 
-use super::{Split, TrainingView};
+use super::{Clock, Split, TrainingView};
 use std::path::PathBuf;
 
 /// The views of a folder before they are divided.
@@ -12,6 +12,8 @@ pub(super) struct Undivided {
     pub views: Vec<TrainingView>,
     /// The split of each view, where the dataset has them.
     pub splits: Option<Vec<Option<Split>>>,
+    /// What the times of the views mean.
+    pub clock: Clock,
     /// File of points to begin training with.
     pub points: Option<PathBuf>,
 }

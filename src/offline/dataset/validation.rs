@@ -26,7 +26,7 @@ pub enum Validation {
     /// The first of these that the dataset allows: a file of validation views, whole cameras, blocks of time, none.
     #[default]
     Auto,
-    /// The views of `transforms_val.json`.
+    /// The views of the dataset's own split `val`, such as `transforms_val.json`.
     File,
     /// Every view of some of the training cameras.
     Cameras,

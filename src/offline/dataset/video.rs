@@ -1,4 +1,4 @@
-//! Frames of videos, by the program `ffmpeg`.
+//! Frames of videos, by the program `ffmpeg`, which the crate `ffmpeg-sidecar` starts and whose progress it reads.
 //!
 //! In: a dataset, a video in it. Out: its frames as PNG in `DATASET.frames/CAMERA/`, beside the dataset. The folder appears whole: frames are written
 //! to a temporary folder, which is then renamed. Frames that are there are used and never overwritten. One process at a time decodes; the folders that
@@ -7,17 +7,18 @@
 use super::DatasetError;
 use super::numbered::{entries, images};
 use crate::codec::text::printable;
+use crate::offline::Progress;
+use ffmpeg_sidecar::command::FfmpegCommand;
+use ffmpeg_sidecar::event::{FfmpegEvent, LogLevel};
 use std::ffi::OsStr;
 use std::fs::{self, File};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
 
 /// What is done with videos whose frames have not been decoded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Videos {
-    /// They are decoded.
-    Decode,
+pub(super) enum Videos<'a> {
+    /// They are decoded, each as a task of its own.
+    Decode(&'a mut dyn Progress),
     /// Each is the image of one view.
     Leave,
 }
@@ -30,10 +31,15 @@ const PREFIX: &str = ".gs4d-";
 const LOCK: &str = ".lock";
 
 /// Returns the frames of a video, which are decoded if they are not there.
-pub(super) fn frames(folder: &Path, video: &Path, camera: &str) -> Result<Vec<PathBuf>, DatasetError> {
+pub(super) fn frames(
+    folder: &Path,
+    video: &Path,
+    camera: &str,
+    progress: &mut dyn Progress,
+) -> Result<Vec<PathBuf>, DatasetError> {
     match decoded(folder, camera)? {
         Some(frames) => Ok(frames),
-        None => decode(OsStr::new(PROGRAM), video, &cache(folder)?, camera, folder),
+        None => decode(OsStr::new(PROGRAM), video, &cache(folder)?, camera, folder, progress),
     }
 }
 
@@ -57,11 +63,12 @@ fn decode(
     cache: &Path,
     camera: &str,
     folder: &Path,
+    progress: &mut dyn Progress,
 ) -> Result<Vec<PathBuf>, DatasetError> {
     let unusable = |reason: String| DatasetError::Unusable { path: video.to_owned(), reason };
     let unwritable = |error: std::io::Error| {
         let reason =
-            format!("its frames cannot be written to {}: {error}; {}", cache.display(), by_hand(folder, camera));
+            format!("its frames cannot be written to {}: {error}; {}", cache.display(), by_hand(folder, video, camera));
         unusable(reason)
     };
     fs::create_dir_all(cache).map_err(unwritable)?;
@@ -93,43 +100,75 @@ fn decode(
     // The protocol is named, since a path may contain a colon.
     let mut input = OsStr::new("file:").to_owned();
     input.push(std::path::absolute(video).map_err(|reason| DatasetError::Read { path: video.to_owned(), reason })?);
-    let mut command = Command::new(program);
-    command.args(["-nostdin", "-v", "error", "-i"]).arg(input);
+    let mut command = FfmpegCommand::new_with_path(program);
+    command.arg("-nostdin").input(input).args(["-start_number", "0"]).output("%05d.png");
     // The program runs inside the folder, whose path may contain a percent sign.
-    command.args(["-start_number", "0", "%05d.png"]).current_dir(temporary.path());
-    let run = command.stdin(Stdio::null()).stdout(Stdio::null()).output().map_err(|error| match error.kind() {
+    command.as_inner_mut().current_dir(temporary.path());
+    progress.note(&format!("decoding {} to {}, once", video.display(), place.display()));
+    let mut child = command.spawn().map_err(|error| match error.kind() {
         ErrorKind::NotFound => unusable(format!(
             "videos are read by ffmpeg, which is not installed: apt install ffmpeg (Linux), brew install ffmpeg (macOS) or winget install \
              ffmpeg (Windows); or, on another machine, {}",
-            by_hand(folder, camera)
+            by_hand(folder, video, camera)
         )),
-        _ => unusable(format!("ffmpeg cannot be started: {error}; {}", by_hand(folder, camera))),
+        _ => unusable(format!("ffmpeg cannot be started: {error}; {}", by_hand(folder, video, camera))),
     })?;
+    let said = child.iter().map(|events| follow(events, progress)).unwrap_or_default();
+    let is_done = child.wait().is_ok_and(|status| status.success());
     let found = images(temporary.path())?;
-    if !run.status.success() || found.is_empty() {
-        let message = String::from_utf8_lossy(&run.stderr);
-        let message = printable(&message.trim().lines().collect::<Vec<_>>().join("; "));
+    if !is_done || found.is_empty() {
+        let message = printable(&said.join("; "));
         return Err(unusable(format!(
             "ffmpeg cannot read it ({message}): copy it again, or {}",
-            by_hand(folder, camera)
+            by_hand(folder, video, camera)
         )));
     }
     fs::rename(temporary.path(), &place).map_err(unwritable)?;
     images(&place)
 }
 
+/// Reports the frames as they are written. Returns the lines about errors.
+fn follow(events: impl Iterator<Item = FfmpegEvent>, progress: &mut dyn Progress) -> Vec<String> {
+    let (mut seconds, mut done, mut begun, mut said) = (0.0, 0, false, Vec::new());
+    for event in events {
+        match event {
+            FfmpegEvent::ParsedDuration(duration) => seconds = duration.duration,
+            FfmpegEvent::ParsedInputStream(stream) if !begun => {
+                if let Some(video) = stream.video_data() {
+                    progress.begin("decoding", (seconds * f64::from(video.fps)).round() as usize);
+                    begun = true;
+                }
+            }
+            FfmpegEvent::Progress(now) if begun => {
+                (done..now.frame).for_each(|_| progress.advance());
+                done = done.max(now.frame);
+            }
+            FfmpegEvent::Log(LogLevel::Error | LogLevel::Fatal | LogLevel::Unknown, line) if !line.is_empty() => {
+                let line = line.replace("[error] ", "").replace("[fatal] ", "");
+                said.push(line);
+            }
+            FfmpegEvent::Error(line) => said.push(line),
+            _ => {}
+        }
+    }
+    if begun {
+        progress.finish();
+    }
+    said
+}
+
 /// Returns the line that makes the frames by hand.
-fn by_hand(folder: &Path, camera: &str) -> String {
-    let shown = folder.display();
+fn by_hand(folder: &Path, video: &Path, camera: &str) -> String {
+    let (shown, video) = (folder.display(), video.display());
     format!(
-        "make the frames by hand: mkdir -p \"{shown}/frames/{camera}\" && ffmpeg -i \"{shown}/{camera}.mp4\" \
-         -start_number 0 \"{shown}/frames/{camera}/%05d.png\""
+        "make the frames by hand: mkdir -p \"{shown}/frames/{camera}\" && ffmpeg -i \"{video}\" -start_number 0 \"{shown}/frames/{camera}/%05d.png\""
     )
 }
 
 #[cfg(all(test, unix))]
 mod tests {
     use super::*;
+    use crate::offline::NoProgress;
     use std::os::unix::fs::PermissionsExt;
 
     /// Writes a program that takes the place of ffmpeg.
@@ -142,7 +181,8 @@ mod tests {
 
     fn decoded_by(program: &Path, folder: &Path) -> Result<Vec<PathBuf>, DatasetError> {
         let data = folder.join("data");
-        decode(program.as_os_str(), &data.join("cam00.mp4"), &folder.join("data.frames"), "cam00", &data)
+        let cache = folder.join("data.frames");
+        decode(program.as_os_str(), &data.join("cam00.mp4"), &cache, "cam00", &data, &mut NoProgress)
     }
 
     /// Returns the names in the folder of frames, without the lock.

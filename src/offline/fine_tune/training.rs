@@ -13,10 +13,14 @@ use super::settings::FineTuneSettings;
 use crate::offline::score::ScoreError;
 use crate::offline::{OfflineError, Progress};
 use crate::scene::GaussianScene;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Steps between two looks at gradients that are not finite.
 const STEPS_OF_FAULTS: usize = 50;
+/// Time after a state from which the next evaluation stores another, whatever its step.
+const LATE: Duration = Duration::from_secs(60);
+/// That time is at least so many times as long as storing the last state took.
+const LEAST_WORK: u32 = 20;
 
 /// Gets a function that returns the scene, whenever there are better parameters.
 pub(crate) type Watch<'a> = &'a mut dyn FnMut(Scene<'_>) -> Result<(), OfflineError>;
@@ -56,10 +60,11 @@ pub(super) fn train(
     (0..first).for_each(|_| progress.advance());
     let (mut seconds, mut told, mut grown) = (0.0, false, Grown::default());
     let begun = Instant::now();
+    let (mut stored_at, mut storing) = (begun, Duration::ZERO);
     let mut start = begun;
     let mut step = first;
     while step < settings.steps && !is_over(settings, &curve, &best) {
-        // The state was stored at the last evaluation: a resumed run makes the steps since then again, and ends at the same bytes.
+        // The last state is of an earlier evaluation: a resumed run makes the steps since then again, and ends at the same bytes.
         if progress.is_interrupted() {
             let pace = (step - first, seconds + start.elapsed().as_secs_f64());
             return Err(run.interrupted(Progressed { curve, best, pace }));
@@ -111,10 +116,13 @@ pub(super) fn train(
             }
         }
         let goes_on = step < settings.steps || settings.compress.is_some();
-        if let Some(saves) = saves.filter(|saves| saves.are_due(step) && goes_on) {
+        let is_late = stored_at.elapsed() > LATE.max(storing * LEAST_WORK);
+        if let Some(saves) = saves.filter(|saves| (saves.are_due(step) || is_late) && goes_on) {
+            let begun = Instant::now();
             let checkpoint = Checkpoint { curve, best, state: run.trainer.state()?, coded: None };
             saves.store(&checkpoint)?;
             Checkpoint { curve, best, .. } = checkpoint;
+            (stored_at, storing) = (Instant::now(), begun.elapsed());
         }
         start = Instant::now();
     }

@@ -1,9 +1,9 @@
 //! The settings of a capture that follow from its views.
 //!
-//! In: training views, optionally an interval of time. Out: [`TrainedWith`] and [`PlaybackHints`].
+//! In: training views, what their times mean, optionally an interval of time and a duration. Out: [`TrainedWith`] and [`PlaybackHints`].
 
 use super::error::StartError;
-use crate::offline::dataset::TrainingView;
+use crate::offline::dataset::{Clock, TrainingView};
 use crate::scene::{PlaybackHints, TrainedCameras, TrainedWith, UpAxis};
 use crate::view::{Lens, RasterFov};
 use glam::{DVec3, Vec3};
@@ -18,25 +18,28 @@ const AXES: [UpAxis; 6] = [UpAxis::PosX, UpAxis::NegX, UpAxis::PosY, UpAxis::Neg
 /// What a capture is trained with that views do not say. Default: the interval of the views, black behind.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct CaptureSettings {
-    /// First and last time; `None`: 0 to 1 if no view is outside, else from the first to the last time of the views.
+    /// First and last time; `None`: 0 to 1 if no view is outside and frames are not numbered, else from the first to the last time of the views.
     pub time_interval: Option<[f32; 2]>,
     /// Background color, in the space of the images.
     pub background: [f32; 3],
+    /// Seconds of one pass through the interval at speed 1, 0 for a still; `None`: as the dataset says, else one second for each unit of time.
+    pub duration_seconds: Option<f32>,
 }
 
-/// Returns the settings of a capture of these views.
+/// Returns the settings of a capture of these views, whose times mean this.
 ///
 /// # Errors
 /// Views from one place, a time that is not finite.
 pub fn capture_of(
     views: &[TrainingView],
     settings: &CaptureSettings,
+    clock: Clock,
 ) -> Result<(TrainedWith, PlaybackHints), StartError> {
     if let Some(view) = views.iter().find(|view| !view.time.is_finite()) {
         return Err(StartError::Time { view: view.name.clone() });
     }
     let spatial_lr_scale = extent(views).ok_or(StartError::OnePlace { views: views.len() })?;
-    let time_interval = settings.time_interval.unwrap_or_else(|| interval(views));
+    let time_interval = settings.time_interval.unwrap_or_else(|| interval(views, clock.is_numbered));
     let is_intrinsic = |view: &TrainingView| matches!(view.camera.lens, Lens::Intrinsics { .. });
     let cameras = if views.iter().any(is_intrinsic) { TrainedCameras::Intrinsics } else { TrainedCameras::Fov };
     let trained_with = TrainedWith {
@@ -47,7 +50,8 @@ pub fn capture_of(
         spatial_lr_scale,
         ..TrainedWith::default()
     };
-    let playback = PlaybackHints { up: up(views), duration_seconds: trained_with.time_span() };
+    let duration_seconds = settings.duration_seconds.unwrap_or(trained_with.time_span() * clock.unit_seconds);
+    let playback = PlaybackHints { up: up(views), duration_seconds };
     Ok((trained_with, playback))
 }
 
@@ -63,11 +67,12 @@ fn center(view: &TrainingView) -> Vec3 {
     view.camera.world_to_camera.inverse().w_axis.truncate()
 }
 
-/// Returns 0 to 1 if no view is outside; else the first and the last time, or one unit from the only time.
-fn interval(views: &[TrainingView]) -> [f32; 2] {
+/// Returns 0 to 1 if no view is outside and frames are not numbered; else the first and the last time, or one unit from the only time.
+fn interval(views: &[TrainingView], is_numbered: bool) -> [f32; 2] {
     let times = || views.iter().map(|view| view.time);
     let [first, last] = [times().fold(f32::INFINITY, f32::min), times().fold(f32::NEG_INFINITY, f32::max)];
-    match (0.0..=1.0).contains(&first) && (0.0..=1.0).contains(&last) {
+    let are_shares = !is_numbered && (0.0..=1.0).contains(&first) && (0.0..=1.0).contains(&last);
+    match are_shares {
         true => [0.0, 1.0],
         false if first < last => [first, last],
         false => [first, first + 1.0],
@@ -98,7 +103,7 @@ mod tests {
 
     fn of(times: [f32; 2]) -> TrainedWith {
         let views = [view(Vec3::X * 4.0, Vec3::Z, times[0]), view(Vec3::Y * 4.0, Vec3::Z, times[1])];
-        capture_of(&views, &CaptureSettings::default()).expect("two places").0
+        capture_of(&views, &CaptureSettings::default(), Clock::default()).expect("two places").0
     }
 
     #[test]
@@ -106,15 +111,37 @@ mod tests {
         assert_eq!(of([0.0, 0.5]).time_interval, [0.0, 1.0], "times of a share of the interval");
         assert_eq!(of([0.0, 9.5]).time_interval, [0.0, 9.5], "seconds");
         assert_eq!(of([7.0, 7.0]).time_interval, [7.0, 8.0], "a still has an interval too");
+        let views = [view(Vec3::X, Vec3::Z, 0.0), view(Vec3::Y, Vec3::Z, 0.5)];
+        let numbered = Clock { is_numbered: true, ..Clock::default() };
+        let found = capture_of(&views, &CaptureSettings::default(), numbered).expect("two places").0.time_interval;
+        assert_eq!(found, [0.0, 0.5], "numbered frames end at the last");
         let given = CaptureSettings { time_interval: Some([0.0, 10.0]), ..CaptureSettings::default() };
         let views = [view(Vec3::X, Vec3::Z, 0.0), view(Vec3::Y, Vec3::Z, 9.5)];
-        assert_eq!(capture_of(&views, &given).expect("two places").0.time_interval, [0.0, 10.0], "as given");
+        assert_eq!(
+            capture_of(&views, &given, Clock::default()).expect("two places").0.time_interval,
+            [0.0, 10.0],
+            "as given"
+        );
+    }
+
+    #[test]
+    fn the_duration_is_given_or_that_of_the_dataset() {
+        let views = [view(Vec3::X, Vec3::Z, 0.0), view(Vec3::Y, Vec3::Z, 2.0)];
+        let seconds = |duration_seconds, unit| {
+            let settings = CaptureSettings { duration_seconds, ..CaptureSettings::default() };
+            let clock = Clock { unit_seconds: unit, is_numbered: false };
+            capture_of(&views, &settings, clock).expect("two places").1.duration_seconds
+        };
+        assert_eq!(seconds(None, 1.0), 2.0, "times are seconds unless the dataset says otherwise");
+        assert_eq!(seconds(None, 4.0), 8.0, "two units of four seconds");
+        assert_eq!(seconds(Some(3.0), 4.0), 3.0, "as given");
     }
 
     #[test]
     fn the_extent_and_the_axis_are_those_of_the_cameras() {
         let views = [view(Vec3::X * 4.0, Vec3::Y, 0.0), view(Vec3::NEG_X * 4.0, Vec3::Y, 1.0)];
-        let (trained_with, playback) = capture_of(&views, &CaptureSettings::default()).expect("two places");
+        let (trained_with, playback) =
+            capture_of(&views, &CaptureSettings::default(), Clock::default()).expect("two places");
         assert!((trained_with.spatial_lr_scale - 4.4).abs() < 1e-5, "1.1 times 4: {}", trained_with.spatial_lr_scale);
         assert_eq!((playback.up, playback.duration_seconds), (UpAxis::PosY, 1.0), "up and duration");
     }
@@ -122,10 +149,10 @@ mod tests {
     #[test]
     fn views_that_no_capture_can_be_trained_on_are_refused() {
         let one = [view(Vec3::X * 4.0, Vec3::Z, 0.0), view(Vec3::X * 4.0, Vec3::Z, 1.0)];
-        let refused = capture_of(&one, &CaptureSettings::default());
+        let refused = capture_of(&one, &CaptureSettings::default(), Clock::default());
         assert_eq!(refused, Err(StartError::OnePlace { views: 2 }), "one place has no depth");
         let timeless = [view(Vec3::X, Vec3::Z, f32::NAN), view(Vec3::Y, Vec3::Z, 0.0)];
-        let refused = capture_of(&timeless, &CaptureSettings::default());
+        let refused = capture_of(&timeless, &CaptureSettings::default(), Clock::default());
         assert_eq!(refused, Err(StartError::Time { view: "a".to_owned() }), "a time that is no number");
     }
 }

@@ -6,9 +6,7 @@
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum StartError {
     /// Depth cannot be found.
-    #[error(
-        "all {views} training views are taken from one place, from which no depth can be found: a capture needs views from several places"
-    )]
+    #[error("{}: a capture needs views from several places", one_place(*.views))]
     OnePlace {
         /// Number of views.
         views: usize,
@@ -21,7 +19,8 @@ pub enum StartError {
     },
     /// The cameras look at nothing together.
     #[error(
-        "the training cameras look away from each other, so that they have no region in common: give views of one scene"
+        "the training cameras look away from each other, so that they have no region in common (are they inside of what they show?): give --points FILE \
+         to begin with points, or views of one scene"
     )]
     NoRegion,
     /// There are no points.
@@ -40,7 +39,15 @@ pub enum StartError {
     NoSurroundings,
     /// There is nothing inside the silhouettes.
     #[error(
-        "no point is inside the silhouettes of the views of a moment (masks or poses of another scene?): give --start random to begin without them"
+        "no point is inside the silhouettes of the views of a moment (masks or poses of another scene?): if both are right, give --start random"
     )]
     NoHull,
+}
+
+/// Says that there is no depth in so many views.
+fn one_place(views: usize) -> String {
+    match views {
+        1 => "a single training view has no depth".to_owned(),
+        _ => format!("all {views} training views are taken from one place, from which no depth can be found"),
+    }
 }

@@ -42,7 +42,8 @@ const FILLING: f32 = 0.02;
 /// Where the points come from. Default: [`Auto`](Self::Auto).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Start {
-    /// From the visual hull if most images have silhouettes and it is not empty, else from the points of the dataset if it has some, else at random.
+    /// From the visual hull if most images have silhouettes, else from the points of the dataset if it has some, else at random. With an empty hull and no
+    /// points the poses or silhouettes are those of another scene.
     #[default]
     Auto,
     /// From points that were measured: of the dataset, or of a file beside it.
@@ -101,8 +102,8 @@ impl Default for StartSettings {
 /// Returns the scene before the first step, and where its points come from: `cloud`, the hull, or random places.
 ///
 /// # Errors
-/// Cameras without a common region, unless points are given; points that were asked for and are not given; a visual hull that was asked for and is
-/// empty; an environment map that was asked for and that images with transparent pixels do not show.
+/// Cameras without a common region, unless points are given; points that were asked for and are not given; a visual hull that is empty, unless there are
+/// points to begin with instead; an environment map that was asked for and that images with transparent pixels do not show.
 pub fn begin(
     images: &TrainingImages,
     trained_with: TrainedWith,
@@ -175,7 +176,7 @@ fn points(
             }
             return Ok((found, Start::Hull));
         }
-        if settings.start == Start::Hull {
+        if settings.start == Start::Hull || cloud.is_none() {
             return Err(StartError::NoHull);
         }
     }

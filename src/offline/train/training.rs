@@ -134,16 +134,19 @@ impl<'a> Training<'a> {
         let TrainSettings { data, splits: options, capture, start, tuning, .. } = settings;
         // Every time, before the interval is known.
         let any_time = TrainedWith { time_interval: [f32::NEG_INFINITY, f32::INFINITY], ..TrainedWith::default() };
-        let views = Splits::open(data, options, &any_time, progress)?.all_training(&any_time, progress)?;
-        let (mut trained_with, playback) = capture_of(&views, capture)?;
+        let all = Splits::open(data, options, &any_time, progress)?;
+        let views = all.all_training(&any_time, progress)?;
+        let of_dataset = |error| OfflineError::about(data, error);
+        let (mut trained_with, playback) = capture_of(&views, capture, all.clock).map_err(of_dataset)?;
         let splits = Splits::open(data, options, &trained_with, progress)?;
         trained_with.validation = Some(splits.to_string());
         require_images(&splits.train)?;
         let (cloud, of_cloud) = settings.cloud(splits.points.as_deref(), progress)?;
-        let key = Key::of_images(&splits.train)?
+        let key = Key::of_images(&splits.train, progress)?
             .with(of_cloud)
-            .with(Key::of_images(&splits.validation)?)
-            .and(&format!("{start:?} {tuning:?} {trained_with:?} {:?} {:?}", splits.train, splits.validation))
+            .with(Key::of_images(&splits.validation, progress)?)
+            .and(&format!("{start:?} {tuning:?} {trained_with:?} {playback:?}"))
+            .and(&format!("{:?} {:?}", splits.train, splits.validation))
             .and(env!("CARGO_PKG_VERSION"));
         Ok(Self { settings, splits, views, trained_with, playback, cloud, key })
     }
@@ -167,7 +170,7 @@ impl<'a> Training<'a> {
     ) -> Result<TrainedCapture, OfflineError> {
         let capacity = self.settings.capacity();
         let Self {
-            settings: TrainSettings { start, tuning, save_every, .. },
+            settings: TrainSettings { data, start, tuning, save_every, .. },
             splits,
             views,
             trained_with,
@@ -180,7 +183,8 @@ impl<'a> Training<'a> {
         let division = splits.to_string();
         let images =
             TrainingImages::load(splits.train, &splits.validation, &trained_with, ImageRoom::of_system(), progress)?;
-        let (scene, started) = begin(&images, trained_with, playback, start, cloud.as_ref())?;
+        let begun = begin(&images, trained_with, playback, start, cloud.as_ref());
+        let (scene, started) = begun.map_err(|error| OfflineError::about(data, error))?;
         let resume = Resume { store, key, every: *save_every };
         let (mut tuned, interrupted) = match train(headless, scene, &images, tuning, Some(resume), Some(out), progress)
         {

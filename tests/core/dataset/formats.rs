@@ -137,6 +137,38 @@ fn refused_split(folder: &Folder) {
 }
 
 #[test]
+fn the_first_number_of_frames_without_times_is_time_0() {
+    let folder = Folder::new();
+    let mut json = nerfstudio(4);
+    for index in 0..4 {
+        json["frames"][index]["frame_number"] = json!(1000 + 3 * index);
+        json["frames"][index]["split"] = json!("train");
+    }
+    folder.write_json("transforms.json", &json);
+    let times: Vec<f32> = open(&folder, Split::Train).views.iter().map(|view| view.time).collect();
+    assert_eq!(times, [0.0, 0.1, 0.2, 0.3], "thirty frames a second");
+}
+
+#[test]
+fn masks_in_a_folder_are_found_beside_blender_images() {
+    let folder = Folder::new();
+    let frame =
+        |index| json!({ "file_path": format!("./train/f{index}"), "transform_matrix": Rig::new(index).to_world() });
+    let json = json!({ "camera_angle_x": 0.8, "frames": [frame(0), frame(1)] });
+    folder.write_json("transforms_train.json", &json);
+    for name in ["train/f0.png", "train/f1.png"] {
+        picture(&folder, name, [200, 100, 50]);
+    }
+    std::fs::create_dir_all(folder.path().join("masks/train")).expect("the folder can be made");
+    let mask = GrayImage::from_fn(WIDTH, HEIGHT, |x, _| Luma([if x < WIDTH / 2 { 255 } else { 0 }]));
+    mask.save(folder.path().join("masks/train/f0.png")).expect("a mask");
+    let views = open(&folder, Split::Train).views;
+    let image = views[0].load_covered().expect("the image and its mask");
+    assert_eq!((image.texels[0], image.texels[WIDTH as usize - 1]), ([200, 100, 50, 255], [0; 4]), "masked");
+    assert!(!views[1].load_covered().expect("the image").has_gaps, "an image without a mask");
+}
+
+#[test]
 fn splits_in_a_nerfstudio_file_are_kept() {
     let folder = Folder::new();
     let mut json = nerfstudio(4);

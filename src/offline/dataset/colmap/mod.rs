@@ -15,7 +15,7 @@ mod text;
 use super::frame::{Frame, Mask, output_name};
 use super::numbered::{images, number, times};
 use super::undivided::Undivided;
-use super::{CameraOptions, DatasetError, FrameProblem, TrainingView, masks, pose};
+use super::{CameraOptions, Clock, DatasetError, FrameProblem, TrainingView, masks, pose};
 use crate::codec::text::is_obeyed;
 use model::Model;
 pub(super) use points::{binary_points, text_points};
@@ -51,7 +51,8 @@ pub(super) fn read(folder: &Path, options: &CameraOptions) -> Result<Undivided, 
     model.images.sort_by(|a, b| a.name.cmp(&b.name));
     let views = views(&model, folder, options)?;
     let points = ["points3D.bin", "points3D.txt"].map(|name| path.join(name)).into_iter().find(|path| path.is_file());
-    Ok(Undivided { source: model.source, views, splits: None, points })
+    let clock = if views.iter().any(|view| view.time > 0.0) { Clock::NUMBERED } else { Clock::default() };
+    Ok(Undivided { source: model.source, views, splits: None, clock, points })
 }
 
 /// Returns the views of a model, whose images are sorted by name.
