@@ -11,6 +11,7 @@ use super::interrupt;
 use super::progress::Bars;
 use super::report::Report;
 use super::table::{bytes, lines};
+use crate::offline::belonging::require_belonging_on_gpu;
 use crate::offline::dataset::Validation;
 use crate::offline::engine::AdapterDescription;
 use crate::offline::files::Files;
@@ -47,6 +48,9 @@ pub(super) struct Train {
     /// time (times), or none; auto takes the first of these that the data allows.
     #[arg(long, help_heading = "Validation", value_name = "VIEWS", default_value = "auto", value_parser = values::one_of(&Validation::NAMES))]
     validation: Validation,
+    /// Skip the check at the end that the capture shows the images that were held out, which fails if the poses are those of other images.
+    #[arg(long, help_heading = "Validation")]
+    trust_images: bool,
     /// First and last time of the capture [default: 0,1 if no view is outside, else from the first view to the last].
     #[arg(long, value_name = "T0,T1", value_parser = values::interval, allow_hyphen_values = true)]
     time_interval: Option<[f32; 2]>,
@@ -134,6 +138,9 @@ pub(super) struct Train {
     renderer: RendererArgs,
 }
 
+/// Steps from which a capture must show its images.
+const CHECKED: usize = 1000;
+
 /// How Gaussians come where they are missing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Densify {
@@ -164,7 +171,7 @@ impl Train {
         let mut headless = self.renderer.open()?;
         let deferred = interrupt::defer();
         let trained = training.run(&mut headless, &store, out, progress)?;
-        let TrainedCapture { tuned, started, views, splits, interrupted } = &trained;
+        let TrainedCapture { tuned, started, views, splits, compared, interrupted } = &trained;
         let (from, interrupted) = (started.name(), *interrupted);
         let size = self.package.save(&tuned.scene)?;
         drop(deferred);
@@ -172,6 +179,11 @@ impl Train {
             store.remove()?;
         }
         let FineTuned { scene, curve, best, steps_per_second, validation, faults, exposures } = tuned;
+        let steps = curve.last().map_or(0, |last| last.step);
+        if steps >= CHECKED && !interrupted && !self.trust_images {
+            let runtime = scene.clone().into_runtime()?;
+            require_belonging_on_gpu(&mut headless, &runtime, compared, runtime.trained_background())?;
+        }
         let quality = match best.psnr {
             Some(psnr) => format!("{psnr:.3} dB at step {} ({validation} validation views)", best.step),
             None => "not measured, no validation views".to_owned(),

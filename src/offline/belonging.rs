@@ -98,7 +98,7 @@ impl Chosen {
             format!(
                 "this image and others do not show this capture: the PSNR of its pictures is {own:.1} dB against their own images and \
                  {others:.1} dB against those of other views; that of empty pictures is {empty:.1} dB; is --data the folder that it was \
-                 trained on? --trust-images skips this check"
+                 trained on, and are its poses those of its images? --trust-images skips this check"
             ),
         ))
     }

@@ -121,6 +121,8 @@ pub struct TrainedCapture {
     pub views: usize,
     /// The division of the views, in words.
     pub splits: String,
+    /// The views that were held out, or, without any, those that it was trained on.
+    pub compared: Vec<TrainingView>,
     /// Whether the user ended the training before its last step.
     pub interrupted: bool,
 }
@@ -181,6 +183,7 @@ impl<'a> Training<'a> {
         TrainingImages::require_room(&splits.train, &splits.validation, headless)?;
         require_room(headless, capacity, start.degree, start.degree_t)?;
         let division = splits.to_string();
+        let compared = if splits.validation.is_empty() { &splits.train } else { &splits.validation }.clone();
         let images =
             TrainingImages::load(splits.train, &splits.validation, &trained_with, ImageRoom::of_system(), progress)?;
         let begun = begin(&images, trained_with, playback, start, cloud.as_ref());
@@ -193,6 +196,6 @@ impl<'a> Training<'a> {
         };
         tuned.scene.trained_with.pixel = trained_pixel(&tuned.scene, &views);
         tuned.scene.trained_with.iteration = tuned.best.step as u64;
-        Ok(TrainedCapture { tuned, started, views: images.len(), splits: division, interrupted })
+        Ok(TrainedCapture { tuned, started, views: images.len(), splits: division, compared, interrupted })
     }
 }
