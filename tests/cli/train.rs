@@ -253,6 +253,29 @@ fn the_duration_is_that_of_the_film_unless_given() {
 }
 
 #[test]
+fn opaque_images_with_poses_of_others_are_an_error_at_the_end() {
+    let Some(capture) = dataset() else { return };
+    let path = capture.data.join("transforms_train.json");
+    let mut json: Value = serde_json::from_str(&fs::read_to_string(&path).expect("a camera file")).expect("JSON");
+    let frames = json["frames"].as_array_mut().expect("frames");
+    let poses: Vec<Value> = frames.iter().map(|frame| frame["transform_matrix"].clone()).collect();
+    for (index, frame) in frames.iter_mut().enumerate() {
+        // Sixteen images of four cameras: each time has its own assignment of poses to images.
+        frame["transform_matrix"] = poses[(5 * index + index / 4 + 3) % poses.len()].clone();
+    }
+    fs::write(&path, json.to_string()).expect("the folder can be written to");
+    let out = capture.path("out.gs4d");
+    let run = |more: &[&str]| {
+        let command = arguments!["train", "--data", &capture.data, "-o", &out, "--gaussians", "100", "--sh-degree", "0"];
+        let short = ["--steps", "1000", "--evaluate-every", "1000"].iter().chain(more).map(Into::into);
+        gs4d(&[command.to_vec(), short.collect()].concat())
+    };
+    run(&[]).must_fail("are its poses those of its images? --trust-images skips this check");
+    assert!(out.is_file(), "the package is written");
+    run(&["--trust-images"]).text();
+}
+
+#[test]
 fn silhouettes_of_other_poses_are_named_as_the_cause() {
     let Some(capture) = dataset() else { return };
     // Every camera looks at the middle, and has its object in a corner.
