@@ -75,8 +75,7 @@ pub(super) struct Bake {
     /// Steps of training from pictures [default: 20000].
     #[arg(long, help_heading = "Training from pictures", value_name = "N", value_parser = values::count(100_000_000))]
     train_steps: Option<usize>,
-    /// Rows of the environment map that is trained behind the Gaussians, as of gs4d train, for images without transparent pixels and masks
-    /// [default: 0, none].
+    /// Rows of the environment map that is trained behind the Gaussians, as of gs4d train; 0: none [default: 32 if the images show surroundings].
     #[arg(long, help_heading = "Training from pictures", value_name = "ROWS", value_parser = clap::value_parser!(u32).range(0..=4096))]
     environment: Option<u32>,
     #[command(flatten)]
@@ -298,7 +297,7 @@ impl Bake {
     fn training(&self, settings: &BakeSettings) -> TrainSettings {
         let mut training = TrainSettings::usual(settings.data.clone(), settings.splits);
         training.start.gaussians = self.gaussians.unwrap_or(training.start.gaussians);
-        training.start.environment = self.environment.unwrap_or(training.start.environment);
+        training.start.environment = self.environment;
         let steps = self.train_steps.unwrap_or(TrainSettings::STEPS);
         training.tuning = FineTuneSettings { exposure: self.exposure, ..TrainSettings::tuning(steps) };
         training.capture = self.checkpoint.capture();

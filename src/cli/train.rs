@@ -81,10 +81,10 @@ pub(super) struct Train {
     /// Degree of color in time, 0 to 2 [default: 2 if the spatial degree is 3].
     #[arg(long, value_name = "DEGREE", value_parser = clap::value_parser!(u32).range(0..=2))]
     sh_degree_t: Option<u32>,
-    /// Rows of the environment map that is trained behind the Gaussians, on a sphere with a radius of 60 units, for images without transparent
-    /// pixels and masks that show what surrounds the scene; 0: none.
-    #[arg(long, value_name = "ROWS", default_value = "0", value_parser = clap::value_parser!(u32).range(0..=4096))]
-    environment: u32,
+    /// Rows of the environment map that is trained behind the Gaussians, on a sphere with a radius of 60 units; 0: none [default: 32 if no image
+    /// has transparent pixels or a mask, and their borders show more than the background color, else 0].
+    #[arg(long, value_name = "ROWS", value_parser = clap::value_parser!(u32).range(0..=4096))]
+    environment: Option<u32>,
     /// Number of training steps.
     #[arg(long, value_name = "N", default_value = "20000", value_parser = values::count(100_000_000))]
     steps: usize,

@@ -236,6 +236,20 @@ fn a_bake_trains_exposures_and_an_environment_map_on_request() {
 }
 
 #[test]
+fn an_environment_map_is_trained_where_images_show_surroundings() {
+    let Some(capture) = dataset() else { return };
+    let out = capture.path("out.gs4d");
+    let map = |more: &[&str]| {
+        let command = arguments!["train", "--data", &capture.data, "-o", &out, "--gaussians", "50", "--sh-degree", "0"];
+        let short = ["--steps", "2", "--validation", "none", "--json"].iter().chain(more).map(Into::into);
+        gs4d(&[command.to_vec(), short.collect()].concat()).json()["environment"].clone()
+    };
+    assert_eq!(map(&[]), Value::Null, "a scene before the color of the background");
+    assert_eq!(map(&["--background", "1,0,0"]), json!([64, 32]), "black surroundings are not red");
+    assert_eq!(map(&["--background", "1,0,0", "--environment", "0"]), Value::Null, "as asked");
+}
+
+#[test]
 fn the_duration_is_that_of_the_film_unless_given() {
     let Some(capture) = dataset() else { return };
     let path = capture.data.join("transforms_train.json");
@@ -266,7 +280,8 @@ fn opaque_images_with_poses_of_others_are_an_error_at_the_end() {
     fs::write(&path, json.to_string()).expect("the folder can be written to");
     let out = capture.path("out.gs4d");
     let run = |more: &[&str]| {
-        let command = arguments!["train", "--data", &capture.data, "-o", &out, "--gaussians", "100", "--sh-degree", "0"];
+        let command =
+            arguments!["train", "--data", &capture.data, "-o", &out, "--gaussians", "100", "--sh-degree", "0"];
         let short = ["--steps", "1000", "--evaluate-every", "1000"].iter().chain(more).map(Into::into);
         gs4d(&[command.to_vec(), short.collect()].concat())
     };

@@ -1,7 +1,7 @@
 //! The Gaussians before the first step.
 //!
 //! In: training images, points if there are any, [`StartSettings`]. Out: a scene of native 4D Gaussians at these points, at points of the visual hull,
-//! or at random ones in the box that the cameras look at; an environment map behind them on request.
+//! or at random ones in the box that the cameras look at; an environment map behind them if the images show surroundings, or on request.
 //!
 //! Opacity is 0.1; the spatial scale is the root of the mean squared distance to the three nearest points; the temporal scale is a share of
 //! the interval; no Gaussian is rotated or moves (section 5.4 of the 4DGS model).
@@ -10,7 +10,7 @@ use super::error::StartError;
 use super::hull::hull;
 use super::point::StartPoint;
 use super::region::Region;
-use super::surroundings::surroundings;
+use super::surroundings::{USUAL_ROWS, are_shown, surroundings};
 use crate::gaussian::harmonics::evaluated;
 use crate::gaussian::{Harmonics, Parameters};
 use crate::offline::dataset::CoveredImage;
@@ -81,8 +81,9 @@ pub struct StartSettings {
     pub degree: u32,
     /// Degree of color in time, 0 to 2; used only if `degree` is 3.
     pub degree_t: u32,
-    /// Rows of the environment map behind the Gaussians, which has twice as many columns; 0: no map. Default: 0.
-    pub environment: u32,
+    /// Rows of the environment map behind the Gaussians, which has twice as many columns; 0: no map. Default: `None`, 32 if no image has gaps and most
+    /// of their borders have another color than the background, else 0.
+    pub environment: Option<u32>,
 }
 
 impl Default for StartSettings {
@@ -94,7 +95,7 @@ impl Default for StartSettings {
             seed: 0,
             degree: 3,
             degree_t: 2,
-            environment: 0,
+            environment: None,
         }
     }
 }
@@ -112,7 +113,12 @@ pub fn begin(
     cloud: Option<&PointCloud>,
 ) -> Result<(GaussianScene, Start), StartError> {
     let pairs: Vec<(&View, &CoveredImage)> = images.first().collect();
-    let rows = settings.environment;
+    let shown = || pairs.iter().map(|(_, image)| *image);
+    let usual = || match !images.has_gaps() && are_shown(shown(), trained_with.background) {
+        true => USUAL_ROWS,
+        false => 0,
+    };
+    let rows = settings.environment.unwrap_or_else(usual);
     if rows > 0 && images.has_gaps() {
         return Err(StartError::NoSurroundings);
     }

@@ -1,9 +1,33 @@
 //! The environment map before the first step.
 //!
-//! In: the background color, the number of rows. Out: a map of this color. Directions that no camera looks at keep it, as without a map. A map of what the
-//! cameras see would show the scene once more behind itself where they look at it from around it.
+//! In: the background color, the number of rows, images. Out: whether the images show surroundings; a map of this color. Directions that no camera looks
+//! at keep it, as without a map. A map of what the cameras see would show the scene once more behind itself where they look at it from around it.
 
+use crate::offline::dataset::CoveredImage;
 use crate::scene::Environment;
+
+/// Rows of the map where images show surroundings, unless another number is asked for.
+pub(super) const USUAL_ROWS: u32 = 32;
+/// Difference of a channel, 0 to 255, up to which a pixel has the color of the background.
+const SAME: f32 = 8.0;
+
+/// Returns whether opaque images show what surrounds the scene: most pixels of their borders do not have the color of the background. A plain backdrop
+/// in that color is none.
+pub(super) fn are_shown<'a>(images: impl Iterator<Item = &'a CoveredImage>, background: [f32; 3]) -> bool {
+    let (mut all, mut others) = (0_u64, 0_u64);
+    for image in images {
+        let (width, height) = (image.size.x as usize, image.size.y as usize);
+        let ends = [0, height - 1].into_iter().flat_map(|row| (0..width).map(move |column| row * width + column));
+        let sides = (0..height).flat_map(|row| [row * width, row * width + width - 1]);
+        for index in ends.chain(sides) {
+            let texel = image.texels[index];
+            let differs = |(value, background): (&u8, f32)| (f32::from(*value) - 255.0 * background).abs() > SAME;
+            all += 1;
+            others += u64::from(texel[..3].iter().zip(background).any(differs));
+        }
+    }
+    2 * others > all
+}
 
 /// Returns the map, with twice as many columns as rows.
 pub(super) fn surroundings(background: [f32; 3], rows: u32) -> Environment {
@@ -15,7 +39,25 @@ pub(super) fn surroundings(background: [f32; 3], rows: u32) -> Environment {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::Vec3;
+    use glam::{UVec2, Vec3};
+
+    #[test]
+    fn a_plain_backdrop_shows_no_surroundings() {
+        let size = UVec2::new(6, 4);
+        let of = |border: [u8; 4]| {
+            let texel = |index: u32| {
+                let (x, y) = (index % size.x, index / size.x);
+                let is_inside = (1..size.x - 1).contains(&x) && (1..size.y - 1).contains(&y);
+                if is_inside { [200, 100, 50, 255] } else { border }
+            };
+            CoveredImage { size, texels: (0..size.element_product()).map(texel).collect(), has_gaps: false }
+        };
+        let (black, room) = (of([3, 0, 5, 255]), of([90, 80, 70, 255]));
+        assert!(!are_shown([&black, &black].into_iter(), [0.0; 3]), "noise of a black backdrop");
+        assert!(are_shown([&room].into_iter(), [0.0; 3]), "a room");
+        assert!(are_shown([&black].into_iter(), [1.0; 3]), "not the color of this background");
+        assert!(!are_shown([&black, &room].into_iter(), [0.0; 3]), "half of the borders are not most of them");
+    }
 
     #[test]
     fn the_map_has_the_background_color_in_every_direction() {
