@@ -3,6 +3,7 @@
 //! In: `[FILE] [--headless FOLDER] [--frames N] [--help]` and the options of one example. Out: [`Arguments`], an asset path, pictures in
 //! a folder.
 
+use bevy::asset::io::file::FileAssetReader;
 use bevy::prelude::*;
 use bevy_gs4d::testing;
 use std::path::{Path, PathBuf};
@@ -81,11 +82,12 @@ fn has_display() -> bool {
     !cfg!(target_os = "linux") || std::env::var_os("DISPLAY").is_some_and(|display| !display.is_empty())
 }
 
-/// Returns a path from the command line as an asset path: relative to the current folder if there is such a file, else
-/// to `assets/`.
+/// Returns a path from the command line as an asset path: relative to `assets/` if there is such a file there and none in the current folder, else to the
+/// current folder, where it may appear later.
 pub fn asset_path(argument: &str) -> PathBuf {
     let path = Path::new(argument);
-    if path.exists() { std::path::absolute(path).unwrap_or_else(|_| path.into()) } else { path.into() }
+    let is_asset = FileAssetReader::get_base_path().join("assets").join(path).exists();
+    if is_asset && !path.exists() { path.into() } else { std::path::absolute(path).unwrap_or_else(|_| path.into()) }
 }
 
 /// Renders `count` pictures, `step` apart, into `folder`, and prints its path.

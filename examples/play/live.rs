@@ -13,18 +13,22 @@ use std::time::SystemTime;
 /// What changes with the contents of a file.
 type Stamp = (u64, Option<SystemTime>);
 
-/// Loads the capture again if its file has changed since the last look. A file that is missing for a moment is not a change.
+/// Loads the capture again if its file has changed since the last look, or has appeared. A file that is missing for a moment is not a change.
 pub fn reload_changed(
     assets: Res<AssetServer>,
     capture: Single<&GaussianCapture3d>,
-    mut seen: Local<Option<(AssetId<GaussianCapture>, Stamp)>>,
+    mut seen: Local<Option<(AssetId<GaussianCapture>, Option<Stamp>)>>,
 ) {
     let Some(path) = assets.get_path(capture.0.id()) else { return };
     // An absolute path replaces the folder.
     let file = FileAssetReader::get_base_path().join("assets").join(path.path());
-    let Ok(found) = fs::metadata(file) else { return };
-    let now = (capture.0.id(), (found.len(), found.modified().ok()));
-    if seen.is_some_and(|before| before.0 == now.0 && before != now) {
+    let stamp = fs::metadata(file).ok().map(|found| (found.len(), found.modified().ok()));
+    let now = (capture.0.id(), stamp);
+    let before = seen.filter(|before| before.0 == now.0);
+    if before.is_some() && stamp.is_none() {
+        return;
+    }
+    if before.is_some_and(|before| before != now) {
         assets.reload(path.into_owned());
     }
     *seen = Some(now);

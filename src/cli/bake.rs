@@ -351,7 +351,8 @@ impl Bake {
             data,
             out: out.to_owned(),
             splits: SplitOptions { size: None, resolution: self.resolution, validation: self.validation.validation },
-            background: self.checkpoint.background,
+            // A capture of pictures is trained with the background, or has an environment map.
+            background: if self.is_dataset() { None } else { self.checkpoint.background },
             goal: self.goal(),
             rounds: self.rounds,
             score: self.variant,

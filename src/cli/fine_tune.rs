@@ -78,7 +78,7 @@ pub(super) struct FineTune {
     /// Steps between two computations of a key-frame or interval filter.
     #[arg(long, value_name = "N", default_value = "1000", value_parser = values::count(100_000_000))]
     refresh_filter: usize,
-    /// Steps between two saved states, rounded up to the next evaluation.
+    /// A state is saved at evaluations whose step is a multiple of N, and at the first one a minute after the last state.
     #[arg(long, value_name = "N", default_value = "500", value_parser = values::count(1_000_000))]
     save_every: usize,
     /// Gradients: exact, or compat, which are those of the original with its deviations.

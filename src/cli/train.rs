@@ -48,7 +48,7 @@ pub(super) struct Train {
     /// time (times), or none; auto takes the first of these that the data allows.
     #[arg(long, help_heading = "Validation", value_name = "VIEWS", default_value = "auto", value_parser = values::one_of(&Validation::NAMES))]
     validation: Validation,
-    /// Skip the check at the end that the capture shows the images that were held out, which fails if the poses are those of other images.
+    /// Skip the check, after 1000 steps or more, that the capture shows the images, which fails if the poses are those of other images.
     #[arg(long, help_heading = "Validation")]
     trust_images: bool,
     /// First and last time of the capture [default: 0,1 if no view is outside, else from the first view to the last].
@@ -129,7 +129,7 @@ pub(super) struct Train {
     /// Steps between two evaluations on the validation views.
     #[arg(long, value_name = "N", default_value = "1000", value_parser = values::count(1_000_000))]
     evaluate_every: usize,
-    /// Steps between two saved states, rounded up to the next evaluation; the first evaluation after a minute without one saves a state, too.
+    /// A state is saved at evaluations whose step is a multiple of N, and at the first one a minute after the last state.
     #[arg(long, value_name = "N", default_value = "5000", value_parser = values::count(1_000_000))]
     save_every: usize,
     #[command(flatten)]
@@ -244,6 +244,9 @@ impl Train {
         }
         if matches!(self.start, Start::Hull | Start::Random) {
             self.given.none_of(&["--points"], &format!("with --start {}", self.start.name()))?;
+        }
+        if self.steps < CHECKED {
+            self.given.none_of(&["--trust-images"], "with fewer than 1000 steps, after which nothing is checked")?;
         }
         match self.sh_degree < 3 {
             true => self.given.none_of(&["--sh-degree-t"], WITHOUT_TIME),

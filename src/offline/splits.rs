@@ -72,9 +72,8 @@ impl Splits {
             Some(validation) => HeldOut { train: views, validation, by: Validation::File },
             None => hold_out(&views, options.validation).ok_or_else(|| {
                 let message = format!(
-                    "does not allow --validation {}: it has too few cameras or times, or no {}",
-                    options.validation,
-                    Split::Val.file_name()
+                    "does not allow --validation {}: it has too few cameras or times, or no split val of its own",
+                    options.validation
                 );
                 OfflineError::at(folder, message)
             })?,
@@ -108,7 +107,7 @@ impl Splits {
             Ok(()) => Ok(Some(dataset.views)),
             Err(error) if options.validation == Validation::File => Err(error.into()),
             Err(error) => {
-                progress.note(&format!("note: {} is not used: {error}", Split::Val.file_name()));
+                progress.note(&format!("note: the dataset's own split val is not used: {error}"));
                 Ok(None)
             }
         }

@@ -63,8 +63,8 @@ impl Key {
     /// Returns the key of the contents of the images and masks of these views. A file that is missing counts as such. Begins the task "hashing images".
     ///
     /// # Errors
-    /// The first file that cannot be read although it is there, by name.
-    pub fn of_images(views: &[TrainingView], progress: &mut dyn Progress) -> Result<Self, CodecError> {
+    /// The first file that cannot be read although it is there, by name; an interruption.
+    pub fn of_images(views: &[TrainingView], progress: &mut dyn Progress) -> Result<Self, OfflineError> {
         let paths: Vec<&Path> = views
             .iter()
             .flat_map(|view| [Some(&view.image), view.mask.as_ref()])
@@ -75,7 +75,8 @@ impl Key {
         let mut hashes = Vec::new();
         progress.begin("hashing images", paths.len());
         for some in paths.chunks(AT_ONCE) {
-            hashes.extend(some.par_iter().map(hash).collect::<Result<Vec<Self>, _>>()?);
+            proceed(progress)?;
+            hashes.extend(some.par_iter().map(hash).collect::<Result<Vec<Self>, CodecError>>()?);
             some.iter().for_each(|_| progress.advance());
         }
         progress.finish();

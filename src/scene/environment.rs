@@ -23,6 +23,9 @@ pub struct Environment {
 }
 
 impl Environment {
+    /// Radius of the sphere that the texture is on, capture units.
+    pub(crate) const RADIUS: f32 = RADIUS;
+
     /// Returns the color where the ray from `origin` along the unit vector `direction` (capture space) leaves the
     /// sphere. Bilinear, black outside the texture: the seam at the ends of `u` fades, as in the original.
     ///

@@ -127,19 +127,21 @@ fn headless_writes_pictures() {
     check("headless", &["--size", "200x120"], 2);
 }
 
-/// Returns a folder with the assets of the crate, except that the capture is fully transparent. Its duration and bounds are unchanged.
+/// Returns a folder with the assets of the crate, except that the captures are fully transparent. Their durations and bounds are unchanged.
 fn invisible() -> TempDir {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let (from, to) = (Path::new(ROOT).join("assets"), folder.path().join("assets"));
     std::fs::create_dir(&to).expect("the folder can be written to");
     std::fs::copy(from.join("demo.timeline.ron"), to.join("demo.timeline.ron")).expect("the timeline can be copied");
-    let scene = codec::load(&from.join("toybox.gs4d"), &ReadOptions::default()).expect("the bundled capture");
-    let mut scene = scene.unpacked().into_runtime().expect("it can be drawn");
-    for gaussian in &mut scene.form.as_sliced_mut().expect("unpacked").gaussians {
-        gaussian.opacity = 0.0;
+    for name in ["toybox.gs4d", "island.gs4d"] {
+        let scene = codec::load(&from.join(name), &ReadOptions::default()).expect("a bundled capture");
+        let mut scene = scene.unpacked().into_runtime().expect("it can be drawn");
+        for gaussian in &mut scene.form.as_sliced_mut().expect("unpacked").gaussians {
+            gaussian.opacity = 0.0;
+        }
+        let scene = GaussianScene::from(scene);
+        offline::save(&to.join(name), &scene, &WriteSettings { level: 1 }).expect("the folder can be written to");
     }
-    let scene = GaussianScene::from(scene);
-    offline::save(&to.join("toybox.gs4d"), &scene, &WriteSettings { level: 1 }).expect("the folder can be written to");
     folder
 }
 

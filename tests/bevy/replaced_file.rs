@@ -26,7 +26,6 @@ fn write(path: &Path, count: usize) {
 fn play_loads_a_capture_again_whose_file_is_replaced() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let file = folder.path().join("training.gs4d");
-    write(&file, 50);
     let mut app = App::new();
     // As in the example: captures may be anywhere.
     let assets = AssetPlugin { unapproved_path_mode: UnapprovedPathMode::Allow, ..default() };
@@ -37,7 +36,10 @@ fn play_loads_a_capture_again_whose_file_is_replaced() {
     let count = |app: &App| {
         app.world().resource::<Assets<GaussianCapture>>().get(&capture).map(|capture| capture.scene().len())
     };
-    wait_until(&mut app, "loading", |app| count(app) == Some(50), App::update);
+    let state = |app: &App| app.world().resource::<AssetServer>().load_state(&capture);
+    wait_until(&mut app, "failing", |app| state(app).is_failed(), App::update);
+    write(&file, 50);
+    wait_until(&mut app, "the first package of a training", |app| count(app) == Some(50), App::update);
     for _ in 0..20 {
         app.update();
     }

@@ -231,6 +231,8 @@ fn a_bake_trains_exposures_and_an_environment_map_on_request() {
     let (_, plain) = bake("plain", &[]);
     let (info, with_map) = bake("map", &["--environment", "4"]);
     assert_eq!(info["environment"], json!([8, 4]), "twice as wide as high: {info}");
+    let (info, _) = bake("red", &["--background", "1,0,0"]);
+    assert_eq!(info["environment"], json!([64, 32]), "black borders are surroundings before red: {info}");
     let (_, exposed) = bake("exposed", &["--exposure"]);
     assert!(plain != exposed && plain != with_map, "the exposures of the cameras change what is trained");
 }
@@ -272,17 +274,19 @@ fn opaque_images_with_poses_of_others_are_an_error_at_the_end() {
     let path = capture.data.join("transforms_train.json");
     let mut json: Value = serde_json::from_str(&fs::read_to_string(&path).expect("a camera file")).expect("JSON");
     let frames = json["frames"].as_array_mut().expect("frames");
-    let poses: Vec<Value> = frames.iter().map(|frame| frame["transform_matrix"].clone()).collect();
     for (index, frame) in frames.iter_mut().enumerate() {
-        // Sixteen images of four cameras: each time has its own assignment of poses to images.
-        frame["transform_matrix"] = poses[(5 * index + index / 4 + 3) % poses.len()].clone();
+        // Each looks at the axis from another side.
+        let (sin, cos) = (2.4 * index as f64).sin_cos();
+        frame["transform_matrix"] =
+            json!([[-sin, 0, cos, 4.0 * cos], [cos, 0, sin, 4.0 * sin], [0, 1, 0, 0], [0, 0, 0, 1]]);
     }
     fs::write(&path, json.to_string()).expect("the folder can be written to");
     let out = capture.path("out.gs4d");
     let run = |more: &[&str]| {
         let command =
             arguments!["train", "--data", &capture.data, "-o", &out, "--gaussians", "100", "--sh-degree", "0"];
-        let short = ["--steps", "1000", "--evaluate-every", "1000"].iter().chain(more).map(Into::into);
+        let short =
+            ["--steps", "1000", "--evaluate-every", "1000", "--validation", "times"].iter().chain(more).map(Into::into);
         gs4d(&[command.to_vec(), short.collect()].concat())
     };
     run(&[]).must_fail("are its poses those of its images? --trust-images skips this check");

@@ -140,6 +140,9 @@ pub enum DatasetError {
         /// Width and height according to the camera file, pixels.
         expected: UVec2,
     },
+    /// The user has requested an early end while videos were decoded.
+    #[error("interrupted")]
+    Interrupted,
     /// A file of a dataset, or a video, cannot be used.
     #[error("{}: {reason}", .path.display())]
     Unusable {
@@ -218,8 +221,8 @@ pub enum FrameProblem {
     Folded,
     /// The distortion of the camera model cannot be undone.
     #[error(
-        "camera_model is \"{0}\", whose distortion cannot be undone (PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, OPENCV_FISHEYE and, of COLMAP, FULL_OPENCV and other fisheye lenses without prisms can): \
-         {UNDISTORT}; then write PINHOLE"
+        "camera_model is \"{0}\", whose distortion cannot be undone (PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV and OPENCV_FISHEYE can, of \
+         COLMAP also SIMPLE_PINHOLE, FULL_OPENCV, FISHEYE, SIMPLE_FISHEYE, RADIAL_FISHEYE and SIMPLE_RADIAL_FISHEYE): {UNDISTORT}; then write PINHOLE"
     )]
     CameraModel(String),
     /// The principal point of a golden view is not the center of the picture.

@@ -1,4 +1,4 @@
-//! Frames of videos, by the program `ffmpeg`, which the crate `ffmpeg-sidecar` starts and whose progress it reads.
+//! Frames of videos, by the program `ffmpeg`, which the crate `ffmpeg-sidecar` starts.
 //!
 //! In: a dataset, a video in it. Out: its frames as PNG in `DATASET.frames/CAMERA/`, beside the dataset. The folder appears whole: frames are written
 //! to a temporary folder, which is then renamed. Frames that are there are used and never overwritten. One process at a time decodes; the folders that
@@ -9,15 +9,14 @@ use super::numbered::{entries, images};
 use crate::codec::text::printable;
 use crate::offline::Progress;
 use ffmpeg_sidecar::command::FfmpegCommand;
-use ffmpeg_sidecar::event::{FfmpegEvent, LogLevel};
 use std::ffi::OsStr;
 use std::fs::{self, File};
-use std::io::ErrorKind;
+use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 /// What is done with videos whose frames have not been decoded.
 pub(super) enum Videos<'a> {
-    /// They are decoded, each as a task of its own.
+    /// They are decoded.
     Decode(&'a mut dyn Progress),
     /// Each is the image of one view.
     Leave,
@@ -29,6 +28,10 @@ const PROGRAM: &str = "ffmpeg";
 const PREFIX: &str = ".gs4d-";
 /// File that is locked while a process decodes, so that all temporary folders are those of killed processes.
 const LOCK: &str = ".lock";
+/// Most bytes that are kept of what the program says.
+const MOST_SAID: usize = 2048;
+/// Most characters of it that an error shows.
+const MOST_SHOWN: usize = 240;
 
 /// Returns the frames of a video, which are decoded if they are not there.
 pub(super) fn frames(
@@ -79,8 +82,12 @@ fn decode(
             path.file_name().is_some_and(|name| name.as_encoded_bytes().starts_with(PREFIX.as_bytes()))
         };
         for path in entries(cache)?.into_iter().filter(is_temporary) {
-            fs::remove_dir_all(path).map_err(unwritable)?;
+            // A program whose parent was killed may still write to it.
+            let _ = fs::remove_dir_all(path);
         }
+    }
+    if progress.is_interrupted() {
+        return Err(DatasetError::Interrupted);
     }
     // Another process may have decoded the video in the meantime.
     let place = cache.join(camera);
@@ -101,7 +108,11 @@ fn decode(
     let mut input = OsStr::new("file:").to_owned();
     input.push(std::path::absolute(video).map_err(|reason| DatasetError::Read { path: video.to_owned(), reason })?);
     let mut command = FfmpegCommand::new_with_path(program);
-    command.arg("-nostdin").input(input).args(["-start_number", "0"]).output("%05d.png");
+    command
+        .args(["-hide_banner", "-nostdin", "-v", "error"])
+        .input(input)
+        .args(["-start_number", "0"])
+        .output("%05d.png");
     // The program runs inside the folder, whose path may contain a percent sign.
     command.as_inner_mut().current_dir(temporary.path());
     progress.note(&format!("decoding {} to {}, once", video.display(), place.display()));
@@ -113,48 +124,41 @@ fn decode(
         )),
         _ => unusable(format!("ffmpeg cannot be started: {error}; {}", by_hand(folder, video, camera))),
     })?;
-    let said = child.iter().map(|events| follow(events, progress)).unwrap_or_default();
-    let is_done = child.wait().is_ok_and(|status| status.success());
+    drop(child.take_stdin());
+    drop(child.take_stdout());
+    let said = child.take_stderr().map_or(String::new(), last_lines);
+    let status = child.wait().map_err(unwritable)?;
+    if progress.is_interrupted() {
+        return Err(DatasetError::Interrupted);
+    }
     let found = images(temporary.path())?;
-    if !is_done || found.is_empty() {
-        let message = printable(&said.join("; "));
+    if status.code().is_none() {
+        return Err(unusable("ffmpeg was ended by a signal: run the command again".to_owned()));
+    }
+    if !status.success() || found.is_empty() {
         return Err(unusable(format!(
-            "ffmpeg cannot read it ({message}): copy it again, or {}",
+            "ffmpeg cannot read it ({said}): copy it again, or {}",
             by_hand(folder, video, camera)
         )));
+    }
+    if !said.is_empty() {
+        let count = found.len();
+        progress.note(&format!("note: {}: ffmpeg found {count} frames, and errors: {said}", video.display()));
     }
     fs::rename(temporary.path(), &place).map_err(unwritable)?;
     images(&place)
 }
 
-/// Reports the frames as they are written. Returns the lines about errors.
-fn follow(events: impl Iterator<Item = FfmpegEvent>, progress: &mut dyn Progress) -> Vec<String> {
-    let (mut seconds, mut done, mut begun, mut said) = (0.0, 0, false, Vec::new());
-    for event in events {
-        match event {
-            FfmpegEvent::ParsedDuration(duration) => seconds = duration.duration,
-            FfmpegEvent::ParsedInputStream(stream) if !begun => {
-                if let Some(video) = stream.video_data() {
-                    progress.begin("decoding", (seconds * f64::from(video.fps)).round() as usize);
-                    begun = true;
-                }
-            }
-            FfmpegEvent::Progress(now) if begun => {
-                (done..now.frame).for_each(|_| progress.advance());
-                done = done.max(now.frame);
-            }
-            FfmpegEvent::Log(LogLevel::Error | LogLevel::Fatal | LogLevel::Unknown, line) if !line.is_empty() => {
-                let line = line.replace("[error] ", "").replace("[fatal] ", "");
-                said.push(line);
-            }
-            FfmpegEvent::Error(line) => said.push(line),
-            _ => {}
-        }
+/// Reads what the program says to its end. Returns the end of it, in one line.
+fn last_lines(mut said: impl Read) -> String {
+    let (mut kept, mut more) = (Vec::new(), [0; 4096]);
+    while let Ok(count @ 1..) = said.read(&mut more) {
+        kept.extend_from_slice(&more[..count]);
+        kept.drain(..kept.len().saturating_sub(MOST_SAID));
     }
-    if begun {
-        progress.finish();
-    }
-    said
+    let line = String::from_utf8_lossy(&kept).trim().lines().collect::<Vec<_>>().join("; ");
+    let skipped = line.chars().count().saturating_sub(MOST_SHOWN);
+    printable(&line.chars().skip(skipped).collect::<String>())
 }
 
 /// Returns the line that makes the frames by hand.
@@ -246,6 +250,24 @@ mod tests {
         for part in ["cam00.mp4", "apt install ffmpeg", "data/frames/cam00/%05d.png\""] {
             assert!(error.contains(part), "{part:?} is not in: {error}");
         }
+    }
+
+    #[test]
+    fn a_program_that_says_much_is_read_to_its_end() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let script = format!("i=0; while [ $i -lt 30000 ]; do echo error $i >&2; i=$((i+1)); done; {FRAMES}");
+        let found = decoded_by(&program(folder.path(), &script), folder.path()).expect("the program writes frames");
+        assert_eq!(found.len(), 2, "errors do not matter if there are frames");
+        let kept = last_lines(&b"first\n".iter().copied().cycle().take(9000).chain(*b"last\n").collect::<Vec<_>>()[..]);
+        assert!(kept.len() < 300 && kept.ends_with("; last"), "one line of bounded length: {kept}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_program_that_a_signal_ends_is_not_the_fault_of_the_video() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let error = decoded_by(&program(folder.path(), "kill -9 $$"), folder.path()).expect_err("killed").to_string();
+        assert!(error.contains("ended by a signal") && !error.contains("copy it again"), "{error}");
     }
 
     #[test]

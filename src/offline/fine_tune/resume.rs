@@ -23,7 +23,7 @@ pub struct Resume<'a> {
     pub store: &'a Store,
     /// Everything that the result depends on besides the settings.
     pub key: Key,
-    /// Steps between two states.
+    /// A state is stored at evaluations whose step is a multiple of this.
     pub every: usize,
 }
 

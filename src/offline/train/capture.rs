@@ -50,7 +50,8 @@ pub fn capture_of(
         spatial_lr_scale,
         ..TrainedWith::default()
     };
-    let duration_seconds = settings.duration_seconds.unwrap_or(trained_with.time_span() * clock.unit_seconds);
+    let of_dataset = Some(trained_with.time_span() * clock.unit_seconds).filter(|seconds| seconds.is_finite());
+    let duration_seconds = settings.duration_seconds.or(of_dataset).unwrap_or(trained_with.time_span());
     let playback = PlaybackHints { up: up(views), duration_seconds };
     Ok((trained_with, playback))
 }

@@ -18,7 +18,7 @@ use crate::offline::dataset::point_cloud::PointCloud;
 use crate::offline::fine_tune::TrainingImages;
 use crate::offline::fine_tune::neighbors::{NEIGHBORS, neighbors};
 use crate::scene::random::Random;
-use crate::scene::{GaussianScene, PlaybackHints, SceneForm, Trained, TrainedWith};
+use crate::scene::{Environment, GaussianScene, PlaybackHints, SceneForm, Trained, TrainedWith};
 use crate::view::View;
 use glam::Vec3;
 
@@ -81,8 +81,8 @@ pub struct StartSettings {
     pub degree: u32,
     /// Degree of color in time, 0 to 2; used only if `degree` is 3.
     pub degree_t: u32,
-    /// Rows of the environment map behind the Gaussians, which has twice as many columns; 0: no map. Default: `None`, 32 if no image has gaps and most
-    /// of their borders have another color than the background, else 0.
+    /// Rows of the environment map behind the Gaussians, which has twice as many columns; 0: no map. Default: `None`, 32 if no image has gaps, most of
+    /// their borders have another color than the background, and all cameras are within half the radius of the map, else 0.
     pub environment: Option<u32>,
 }
 
@@ -114,7 +114,8 @@ pub fn begin(
 ) -> Result<(GaussianScene, Start), StartError> {
     let pairs: Vec<(&View, &CoveredImage)> = images.first().collect();
     let shown = || pairs.iter().map(|(_, image)| *image);
-    let usual = || match !images.has_gaps() && are_shown(shown(), trained_with.background) {
+    let are_inside = images.all_views().all(|view| 2.0 * view.camera_position.length() < Environment::RADIUS);
+    let usual = || match are_inside && !images.has_gaps() && are_shown(shown(), trained_with.background) {
         true => USUAL_ROWS,
         false => 0,
     };

@@ -7,6 +7,7 @@ use super::capture::{CaptureSettings, capture_of};
 use super::start::{Start, StartSettings, begin};
 use super::train;
 use crate::offline::dataset::point_cloud::PointCloud;
+use crate::offline::dataset::selection::camera_numbers;
 use crate::offline::dataset::{TrainingView, require_images};
 use crate::offline::fine_tune::{
     FineTuneSettings, FineTuned, Growth, ImageRoom, Rates, Resume, Terms, TrainingImages, require_room,
@@ -33,7 +34,7 @@ pub struct TrainSettings {
     pub points: Option<PathBuf>,
     /// How it is trained.
     pub tuning: FineTuneSettings,
-    /// Steps between two saved states, rounded up to the next evaluation.
+    /// A state is saved at evaluations whose step is a multiple of this.
     pub save_every: usize,
 }
 
@@ -121,7 +122,7 @@ pub struct TrainedCapture {
     pub views: usize,
     /// The division of the views, in words.
     pub splits: String,
-    /// The views that were held out, or, without any, those that it was trained on.
+    /// The views that were held out, if these are of several cameras, or else every training view.
     pub compared: Vec<TrainingView>,
     /// Whether the user ended the training before its last step.
     pub interrupted: bool,
@@ -180,10 +181,12 @@ impl<'a> Training<'a> {
             cloud,
             key,
         } = self;
+        // Images of one camera are too much alike to be told apart.
+        let of_several = camera_numbers(&splits.validation).into_iter().any(|camera| camera > 0);
+        let compared = if of_several { splits.validation.clone() } else { views.clone() };
         TrainingImages::require_room(&splits.train, &splits.validation, headless)?;
         require_room(headless, capacity, start.degree, start.degree_t)?;
         let division = splits.to_string();
-        let compared = if splits.validation.is_empty() { &splits.train } else { &splits.validation }.clone();
         let images =
             TrainingImages::load(splits.train, &splits.validation, &trained_with, ImageRoom::of_system(), progress)?;
         let begun = begin(&images, trained_with, playback, start, cloud.as_ref());
