@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Writes the datasets of this folder, and `expected.json`: what other programs find in them.
 
-    python3 -m venv /tmp/venv && /tmp/venv/bin/pip install pycolmap==4.2.1 opencv-python-headless==5.0.0.93 numpy==2.4.6 && /tmp/venv/bin/python make.py
+    pip install pycolmap==4.2.1 opencv-python-headless==5.0.0.93 numpy==2.4.6 && python3 make.py
 
 | folder | written by | expected values by |
 |---|---|---|
