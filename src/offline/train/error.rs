@@ -19,8 +19,8 @@ pub enum StartError {
     },
     /// The cameras look at nothing together.
     #[error(
-        "the training cameras look away from each other, so that they have no region in common (are they inside of what they show?): give --points FILE \
-         to begin with points, or views of one scene"
+        "the training cameras look away from each other, so that they have no region in common (are they inside of what they show?): give views of one \
+         scene, or begin with points: gs4d train --points FILE"
     )]
     NoRegion,
     /// There are no points.
@@ -39,7 +39,8 @@ pub enum StartError {
     NoSurroundings,
     /// There is nothing inside the silhouettes.
     #[error(
-        "no point is inside the silhouettes of the views of a moment (masks or poses of another scene?): if both are right, give --start random"
+        "no point is inside the silhouettes of the views of a moment (masks or poses of another scene?): if both are right, begin \
+         elsewhere: gs4d train --start random"
     )]
     NoHull,
 }

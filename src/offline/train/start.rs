@@ -10,7 +10,7 @@ use super::error::StartError;
 use super::hull::hull;
 use super::point::StartPoint;
 use super::region::Region;
-use super::surroundings::{USUAL_ROWS, are_shown, surroundings};
+use super::surroundings::{surroundings, usual_rows};
 use crate::gaussian::harmonics::evaluated;
 use crate::gaussian::{Harmonics, Parameters};
 use crate::offline::dataset::CoveredImage;
@@ -18,7 +18,7 @@ use crate::offline::dataset::point_cloud::PointCloud;
 use crate::offline::fine_tune::TrainingImages;
 use crate::offline::fine_tune::neighbors::{NEIGHBORS, neighbors};
 use crate::scene::random::Random;
-use crate::scene::{Environment, GaussianScene, PlaybackHints, SceneForm, Trained, TrainedWith};
+use crate::scene::{GaussianScene, PlaybackHints, SceneForm, Trained, TrainedWith};
 use crate::view::View;
 use glam::Vec3;
 
@@ -113,13 +113,7 @@ pub fn begin(
     cloud: Option<&PointCloud>,
 ) -> Result<(GaussianScene, Start), StartError> {
     let pairs: Vec<(&View, &CoveredImage)> = images.first().collect();
-    let shown = || pairs.iter().map(|(_, image)| *image);
-    let are_inside = images.all_views().all(|view| 2.0 * view.camera_position.length() < Environment::RADIUS);
-    let usual = || match are_inside && !images.has_gaps() && are_shown(shown(), trained_with.background) {
-        true => USUAL_ROWS,
-        false => 0,
-    };
-    let rows = settings.environment.unwrap_or_else(usual);
+    let rows = settings.environment.unwrap_or_else(|| usual_rows(images, trained_with.background));
     if rows > 0 && images.has_gaps() {
         return Err(StartError::NoSurroundings);
     }

@@ -1,19 +1,27 @@
 //! The environment map before the first step.
 //!
-//! In: the background color, the number of rows, images. Out: whether the images show surroundings; a map of this color. Directions that no camera looks
+//! In: the background color, images, the number of rows. Out: the usual number of rows for these images; a map of this color. Directions that no camera looks
 //! at keep it, as without a map. A map of what the cameras see would show the scene once more behind itself where they look at it from around it.
 
 use crate::offline::dataset::CoveredImage;
+use crate::offline::fine_tune::TrainingImages;
 use crate::scene::Environment;
 
 /// Rows of the map where images show surroundings, unless another number is asked for.
-pub(super) const USUAL_ROWS: u32 = 32;
+const USUAL_ROWS: u32 = 32;
 /// Difference of a channel, 0 to 255, up to which a pixel has the color of the background.
 const SAME: f32 = 8.0;
 
+/// Returns the usual number of rows: none unless opaque images show surroundings, from cameras within half the radius of the map.
+pub(super) fn usual_rows(images: &TrainingImages, background: [f32; 3]) -> u32 {
+    let are_inside = images.all_views().all(|view| 2.0 * view.camera_position.length() < Environment::RADIUS);
+    let has_map = are_inside && !images.has_gaps() && are_shown(images.first().map(|(_, image)| image), background);
+    if has_map { USUAL_ROWS } else { 0 }
+}
+
 /// Returns whether opaque images show what surrounds the scene: most pixels of their borders do not have the color of the background. A plain backdrop
 /// in that color is none.
-pub(super) fn are_shown<'a>(images: impl Iterator<Item = &'a CoveredImage>, background: [f32; 3]) -> bool {
+fn are_shown<'a>(images: impl Iterator<Item = &'a CoveredImage>, background: [f32; 3]) -> bool {
     let (mut all, mut others) = (0_u64, 0_u64);
     for image in images {
         let (width, height) = (image.size.x as usize, image.size.y as usize);
