@@ -10,9 +10,9 @@
 use crate::scene::{Bits, Packing};
 use serde::{Deserialize, Serialize};
 
-/// Gaussians for each entry of a codebook, at least, and entries of a codebook, at least.
+/// Gaussians for each entry of a codebook, and the number of which the entries of a codebook are a multiple.
 const GAUSSIANS_OF_ENTRY: usize = 64;
-const LEAST_ENTRIES: usize = 64;
+const STEP_OF_ENTRIES: usize = 64;
 
 /// How much may be lost. Default: [`Balanced`](Self::Balanced).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -59,7 +59,7 @@ impl CompressSettings {
     /// with them.
     pub fn suiting(quality: Quality, gaussians: usize) -> Self {
         let mut settings = Self::from(quality);
-        let entries = (gaussians / GAUSSIANS_OF_ENTRY).next_power_of_two().max(LEAST_ENTRIES);
+        let entries = (gaussians / GAUSSIANS_OF_ENTRY).next_multiple_of(STEP_OF_ENTRIES).max(STEP_OF_ENTRIES);
         settings.codebooks.iter_mut().for_each(|own| *own = (*own).min(entries));
         settings
     }
@@ -101,5 +101,19 @@ impl From<Quality> for CompressSettings {
         };
         let color_step = if quality == Quality::VisuallyLossless { Packing::default().color_step } else { 0.0 };
         Self { geometry, codebooks, color_step, weights: None }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_entries_of_codebooks_follow_the_number_of_gaussians() {
+        let entries = |count| CompressSettings::suiting(Quality::Balanced, count).codebooks;
+        assert_eq!(entries(10), [64; 4], "the fewest");
+        assert_eq!(entries(18_000), [320; 4], "281 entries, rounded up to a multiple of 64");
+        assert_eq!(entries(30_000), [512; 4], "468 entries, rounded up");
+        assert_eq!(entries(1_000_000), [2048, 2048, 2048, 1024], "at most those of the quality");
     }
 }
