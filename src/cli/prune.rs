@@ -35,7 +35,7 @@ Examples:
 
 --max-loss looks for the smallest count whose PSNR on the validation views falls by no more than that; it needs their images. `auto` prunes
 by ours (energy, removal, energy-removal) and by the paper's (full) and keeps the best. The checkpoint was trained on the validation views,
-unless they are those of transforms_val.json: the loss is that against views which it knows.")]
+unless they are the dataset's own split `val`: the loss is that against views which it knows.")]
 pub(super) struct Prune {
     #[command(flatten)]
     given: Given,

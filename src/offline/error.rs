@@ -117,7 +117,8 @@ pub enum OfflineError {
     /// A choice needs validation views, and the dataset has none.
     #[error(
         "{what} needs validation views, and this dataset has too few cameras and times to hold some out unasked (or --validation none is \
-         given): give --validation cameras or times, add transforms_val.json, or name the score and the count"
+         given): give --validation cameras or times, add a split `val` (Blender: transforms_val.json), or name \
+         the score and the count"
     )]
     NoValidation {
         /// The choice that needs validation views.
