@@ -5,6 +5,7 @@
 //! report. Skipped without the folder and without Chromium.
 
 mod browser;
+mod people;
 mod server;
 mod shots;
 

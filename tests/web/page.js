@@ -29,8 +29,10 @@ async function open(query, width = 320, height = 180, seconds = 60) {
     had: (event) => events.filter((one) => one.gs4d === event),
     tell: (gs4d, value, more) => inside.postMessage({ gs4d, value, ...more }, '*'),
     key: (key, target = inside.document.body) => target.dispatchEvent(new inside.KeyboardEvent('keydown', { key, bubbles: true, cancelable: true })),
+    // Of the view that the camera has eased to, at the full resolution.
     picture: async () => {
-      inside.gs4d.redraw();
+      await until('rest', () => inside.gs4d.settled);
+      whole(inside.gs4d);
       return inside.picture();
     },
     close: async (name) => {
@@ -40,6 +42,12 @@ async function open(query, width = 320, height = 180, seconds = 60) {
       frame.remove();
     },
   };
+}
+
+// Draws at the full resolution, however long it takes.
+function whole(page) {
+  page.resolution.moving = page.resolution.still = 1;
+  page.redraw();
 }
 
 const differ = (a, b) => a.length !== b.length || a.reduce((sum, value, i) => sum + Math.abs(value - b[i]), 0) > a.length / 50;
@@ -208,7 +216,6 @@ async function messages() {
   tell('camera', '0,0.3,5,0,0,0.5');
   await until('the camera', () => page.link().includes('camera=0%2C0.3'));
   tell('camera', { pose: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 4, 1], lens: [0.5, 0.3] });
-  tell('camera', { pose: 'nonsense' });
   tell('speed', 4);
   tell('play');
   await until('the end', () => had('ended').length === 1);
@@ -216,10 +223,13 @@ async function messages() {
   tell('open', '/page/nothing.gs4d');
   await until('an error', () => had('error').length === 1);
   results['the page is told of a file that is not there'] = had('error')[0].message.includes('404');
-  tell('nonsense');
-  tell('__proto__');
+  for (const [index, order] of ['nonsense', '__proto__', 'camera'].entries()) {
+    tell(order, { pose: 'nonsense' });
+    await until('an error', () => had('error').length === 2 + index);
+  }
+  inside.postMessage('of somebody else', '*');
   await pause(50);
-  results['other messages are ignored'] = inside.seen.errors.length === 0;
+  results['messages of somebody else are ignored'] = inside.seen.errors.length === 0 && had('error').length === 4;
   inside.seen.console = inside.seen.console.filter((text) => !text.includes('404'));
   await post('messages', results);
   await player.close('messages');
@@ -259,7 +269,7 @@ async function files(player) {
     drop(name, bytes);
     await until(what, () => had('error').length > told);
     broken[`${what}: a message names the file`] = !at('message').hidden && at('text').textContent.includes(name);
-    at('again').click();
+    at('close').click();
     broken[`${what}: the message can be closed`] = at('message').hidden;
     broken[`${what}: the capture stays`] = !differ(shown, await picture());
   }
@@ -280,9 +290,11 @@ async function missing() {
 
 async function phone(player) {
   Object.assign(player.frame.style, { width: '360px', height: '640px' });
+  await until('the layout', () => player.at('canvas').clientWidth === 360);
+  whole(player.page);
   await until('the size', () => player.at('canvas').width === 360 && player.at('canvas').height === 640);
   const results = {};
-  for (const id of ['play', 'seek', 'speed', 'open', 'full']) {
+  for (const id of ['play', 'seek', 'speed', 'background', 'home', 'open', 'link', 'full', 'keys']) {
     const box = player.at(id).getBoundingClientRect();
     results[`${id} is within the screen and large enough for a finger`] = box.left >= 0 && box.right <= 360 && box.bottom <= 640 && box.width >= 44 && box.height >= 44;
   }

@@ -1,70 +1,66 @@
-// The page of a player: controls, files, links, and the messages of a page around it.
+// The player of a page: what plays, is drawn and is asked of it by the user.
 // In: the query of the address (README of this folder), the user, messages. Out: calls of the player in WebAssembly, events for the page around.
 
 import { Orbit } from './camera.js';
+import { Opener, Refusal, nameOf, request } from './files.js';
+import { at, dismiss, help, loading, refuse, say, toolbar } from './parts.js';
+import { Resolution } from './resolution.js';
+import { framed, linkTo, listenAround, obedient, tell } from './around.js';
 
 const query = new URLSearchParams(location.search);
-const at = (id) => document.getElementById(id);
 const stage = at('stage');
 const canvas = at('canvas');
-const framed = window.parent !== window;
 
-// Milliseconds of a slice of loading: the page draws and answers between slices.
-const SLICE = 8;
 // Pixels of the canvas for one of the page, at most.
 const DENSEST = 2;
+// Pixels of the first picture on a software driver, and of the shorter side of the smallest picture.
+const SMALL = 320 * 180;
+const SMALLEST_SIDE = 90;
+const FRAME = 1 / 30;
 const SPEEDS = [0.25, 0.5, 1, 2, 4];
+const BACKGROUNDS = { trained: null, black: [0, 0, 0], gray: [0.5, 0.5, 0.5], white: [1, 1, 1] };
+const WITHOUT =
+  'This browser has no WebGPU, which draws the capture. Chrome and Edge have it since version 113 (on Android 121), Safari since 26, Firefox since 141 on Windows and 145 on Macs. It may be switched off, or the graphics driver may be too old.';
+const calm = matchMedia('(prefers-reduced-motion: reduce)').matches;
 
 let player = null;
+let opener = null;
 let orbit = null;
 let about = null;
-let source = null;
-let turn = 0;
+// The address of the capture that is shown, if the query does not name it; null for a file of this device.
+let source;
+let name = '';
 let seconds = 0;
 let playing = false;
+// Whether the user, the query or the page around wants it to play.
+let wanted = query.get('autoplay') !== '0' && !calm;
 let changed = false;
 let before = 0;
+// 'drawn' when the first picture is on its way, true when it is there.
 let pictured = false;
+let background = 'trained';
+let resolution = new Resolution();
+let drawn = null;
+let told = 0;
+let moved = 0;
+const held = new Set();
 const loops = query.get('loop') !== '0';
 // Milliseconds that the page was blocked at most, by a slice of loading and by a picture; and when the code was compiled.
 const times = { longestSlice: 0, longestDraw: 0, compiled: 0 };
 
-// Events ---------------------------------------------------------------------------------------------------------------
-
-function tell(event, details = {}) {
-  stage.dispatchEvent(new CustomEvent(`gs4d-${event}`, { detail: details, bubbles: true }));
-  if (framed) window.parent.postMessage({ gs4d: event, ...details }, '*');
-}
-
-function say(text) {
-  at('said').textContent = text;
-  clearTimeout(say.timer);
-  say.timer = setTimeout(() => (at('said').textContent = ''), 2500);
-}
-
-// Shows a message, with a button that closes it and does something, if there is anything to do.
-function refuse(text, label = '', action = null) {
-  at('text').textContent = text;
-  at('message').hidden = false;
-  at('again').hidden = !label;
-  at('again').textContent = label;
-  at('again').onclick = () => {
-    at('message').hidden = true;
-    action?.();
-  };
-  at('progress').hidden = true;
+function fail(text, options = {}) {
+  refuse(text, options);
   tell('error', { message: text });
 }
 
-function message(error) {
-  return typeof error === 'string' ? error : (error?.message ?? String(error));
-}
+const message = (error) => (typeof error === 'string' ? error : (error?.message ?? String(error)));
 
 // Playback -------------------------------------------------------------------------------------------------------------
 
 const duration = () => about?.seconds ?? 0;
 
 function play(on = true) {
+  wanted = on;
   if (on && !duration()) return;
   if (on && !loops && seconds >= duration()) seconds = 0;
   if (playing === on) return;
@@ -86,12 +82,58 @@ function setSpeed(value) {
   at('speed').value = String(SPEEDS.reduce((best, one) => (Math.abs(one - value) < Math.abs(best - value) ? one : best)));
 }
 
+const speed = () => Number(at('speed').value);
+
+// Returns whether there is such a background: a name, or six hexadecimal digits.
+function setBackground(value) {
+  const digits = /^#?([0-9a-f]{6})$/i.exec(value)?.[1];
+  if (!digits && !Object.hasOwn(BACKGROUNDS, value)) return false;
+  background = digits ?? value;
+  const color = digits ? [0, 2, 4].map((i) => parseInt(digits.slice(i, i + 2), 16) / 255) : BACKGROUNDS[value];
+  player.set_background?.(color ? Float32Array.from(color) : undefined);
+  at('background').value = digits ? '' : value;
+  changed = true;
+  return true;
+}
+
+function setCamera(value) {
+  const is = typeof value === 'string' ? orbit?.read(value) : orbit?.give(value ?? {});
+  changed = true;
+  return Boolean(is);
+}
+
 function showTime() {
   const slider = at('seek');
   slider.value = duration() ? seconds / duration() : 0;
   const text = `${seconds.toFixed(1)} / ${duration().toFixed(1)} s`;
-  slider.setAttribute('aria-valuetext', text);
+  // Screen readers read the value when the slider has the focus, not at every picture.
+  if (!playing || document.activeElement !== slider) slider.setAttribute('aria-valuetext', text);
   at('time').textContent = text;
+}
+
+// Lets the time of the capture pass: it stands until there is a picture of it.
+function advance(passed) {
+  if (!playing || pictured !== true) return;
+  seconds += passed * speed();
+  if (seconds >= duration()) {
+    seconds = loops ? seconds % duration() : duration();
+    if (!loops) play(false);
+    tell('ended');
+  }
+  changed = true;
+  showTime();
+  if (before - told > 250) {
+    told = before;
+    tell('time', { seconds });
+  }
+}
+
+const FLIGHTS = { d: [0, 1], a: [0, -1], q: [1, 1], e: [1, -1], w: [2, 1], s: [2, -1] };
+
+function flight() {
+  const direction = [0, 0, 0];
+  for (const key of held) direction[FLIGHTS[key][0]] += FLIGHTS[key][1];
+  return direction;
 }
 
 // One frame: the time advances whether the device is ready for a picture or not.
@@ -100,50 +142,69 @@ function frame(now) {
   const passed = Math.min(now - before, 250) / 1000;
   before = now;
   if (!player || !about) return;
-  if (playing) {
-    seconds += passed * Number(at('speed').value);
-    if (seconds >= duration()) {
-      seconds = loops ? seconds % duration() : duration();
-      if (!loops) play(false);
-      tell('ended');
-    }
+  if (orbit.advance(passed, flight())) {
     changed = true;
-    showTime();
+    moved = now;
   }
+  advance(passed);
   const fault = player.fault();
   if (fault) {
     play(false);
-    refuse(fault, 'Load the page again', () => location.reload());
+    fail(fault, { again: 'Load the page again', action: () => location.reload() });
   }
   if (!player.is_ready()) return;
-  if (pictured === 'drawn') {
-    pictured = true;
-    at('poster').classList.add('gone');
-    // Windows of Bevy take the focus.
-    if (!player.resize) canvas.blur();
-    tell('picture', { milliseconds: performance.now() - times.compiled });
+  finish(now);
+  const moves = playing || now - moved < 200;
+  if (changed || (pictured === true && !moves && drawn && player.resize && resolution.sharper(drawn.share))) draw(moves);
+}
+
+// The device has finished a picture.
+function finish(now) {
+  if (drawn?.start) {
+    // The first picture compiles, and tells nothing about the next.
+    if (pictured === true) resolution.learn(now - drawn.start, drawn.share, drawn.moves);
+    drawn.start = 0;
   }
-  if (!changed) return;
+  if (pictured !== 'drawn') return;
+  pictured = true;
+  // A small first picture is followed by one whose time tells how much larger the next may be.
+  changed ||= drawn.share < 1;
+  at('poster').classList.add('gone');
+  loading(null);
+  stage.classList.remove('loading');
+  // Windows of Bevy take the focus.
+  if (!player.resize) canvas.blur();
+  tell('picture', { milliseconds: performance.now() - times.compiled });
+}
+
+function draw(moves) {
   changed = false;
   try {
     const [first, last] = about.interval;
     const time = duration() ? first + ((last - first) * seconds) / duration() : first;
+    const share = resolution.share(moves || pictured !== true);
     const start = performance.now();
-    player.draw(time, orbit.pose(), orbit.lens(canvas.width, canvas.height));
+    fit(share);
+    player.draw(time, orbit.pose(), orbit.lens(canvas.clientWidth, canvas.clientHeight));
     times.longestDraw = Math.max(times.longestDraw, performance.now() - start);
+    drawn = { start, share, moves };
     pictured ||= 'drawn';
   } catch (error) {
     play(false);
-    refuse(message(error), 'Load the page again', () => location.reload());
+    fail(message(error), { again: 'Load the page again', action: () => location.reload() });
   }
 }
 
-// A player without `resize` sizes its canvas itself.
-function resize() {
-  changed = true;
-  if (player && !player.resize) return;
+// Pixels of the canvas at full resolution.
+function fullSize() {
   const density = Math.min(devicePixelRatio, DENSEST) * Math.min(2, Math.max(0.1, Number(query.get('scale')) || 1));
-  const size = [canvas.clientWidth, canvas.clientHeight].map((side) => Math.max(1, Math.round(side * density)));
+  return [canvas.clientWidth, canvas.clientHeight].map((side) => Math.max(1, side * density));
+}
+
+// Sizes the canvas to a share of that. A player without `resize` sizes its canvas itself.
+function fit(share) {
+  if (player && !player.resize) return;
+  const size = fullSize().map((side) => Math.max(1, Math.round(side * share)));
   if (canvas.width === size[0] && canvas.height === size[1]) return;
   [canvas.width, canvas.height] = size;
   player?.resize(...size);
@@ -151,123 +212,74 @@ function resize() {
 
 // Files ----------------------------------------------------------------------------------------------------------------
 
-const channel = new MessageChannel();
-channel.port1.start();
-
-// Lets the page draw and answer.
-function pause() {
-  return new Promise((resolve) => {
-    channel.port1.addEventListener('message', resolve, { once: true });
-    channel.port2.postMessage(null);
-  });
+function report(progress) {
+  loading(progress);
+  tell('progress', progress);
 }
 
-function progress(part) {
-  at('progress').hidden = part >= 1;
-  at('progress').value = part;
-  tell('progress', { part });
-}
-
-// Does a part of the loading, whose time counts.
-function slice(work) {
-  const start = performance.now();
-  const result = work(() => performance.now() - start < SLICE);
-  times.longestSlice = Math.max(times.longestSlice, performance.now() - start);
-  return result;
-}
-
-// Opens a file whose bytes a stream has; its length is 0 if it is not known. The capture that is shown stays if they are no capture.
-async function openStream(name, stream, length, own, address = null) {
-  const reader = stream.getReader();
+// Opens a file. Returns whether it is shown; what was shown stays if it is not.
+async function open(title, begin, again, address) {
+  if (!player) return fail(WITHOUT), false;
+  dismiss();
   try {
-    slice(() => player.open(name, length));
-    for (let received = 0; ; ) {
-      const { done, value } = await reader.read();
-      if (own !== turn) return void reader.cancel();
-      if (done) break;
-      slice(() => player.receive(value));
-      received += value.length;
-      progress(length ? 0.7 * Math.min(1, received / length) : 0.35);
-    }
-    let found;
-    while (!found) {
-      found = slice((hasTime) => {
-        let step;
-        do step = player.step();
-        while (!step && !player.waits() && hasTime());
-        return step;
-      });
-      progress(0.7 + 0.29 * player.progress());
-      await (player.waits() ? new Promise((resolve) => setTimeout(resolve, 1)) : pause());
-      if (own !== turn) return;
-    }
-    show(found, address);
+    const found = await opener.open(title, begin);
+    if (found) show(found, title, address);
+    return Boolean(found);
   } catch (error) {
-    if (own === turn) refuse(`${name} was not opened: ${message(error)}`, about ? 'Close' : '');
+    const action = error instanceof Refusal && error.again ? again : null;
+    fail(message(error), { again: action ? 'Try again' : '', action, closable: Boolean(about) || !action });
+    return false;
   }
 }
 
-// Opens the bytes of a file.
-function openBytes(name, bytes) {
-  return openStream(name, new Blob([bytes]).stream(), bytes.length, ++turn);
+const openBytes = (title, bytes) => open(title, async () => ({ stream: new Blob([bytes]).stream(), length: bytes.length }), null, null);
+
+const openAddress = (address, isOfQuery = false) =>
+  open(nameOf(address), (signal) => request(address, signal), () => openAddress(address, isOfQuery), isOfQuery ? undefined : address);
+
+const openFile = (file) => file && open(file.name, async () => ({ stream: file.stream(), length: file.size }), null, null);
+
+function cancel() {
+  opener?.cancel();
+  loading(null);
+  if (about) say('Loading was cancelled');
+  else fail('Loading was cancelled.', { again: 'Load again', action: () => first() });
 }
 
-function show(found, address) {
+function show(found, title, address) {
   source = address;
+  name = title;
   about = { gaussians: found.gaussians, seconds: found.seconds, interval: [...found.interval], center: found.center, radius: found.radius, up: found.up };
   found.free?.();
-  orbit = new Orbit(about);
-  seconds = 0;
-  changed = true;
-  at('message').hidden = true;
-  progress(1);
-  for (const id of ['play', 'seek']) at(id).disabled = !duration();
+  orbit = new Orbit(about, !calm);
+  [seconds, changed, pictured] = [0, true, false];
+  playing = false;
+  stage.classList.remove('playing');
+  stage.classList.toggle('still', !duration());
+  for (const id of ['play', 'seek', 'speed', 'home', 'link']) at(id).disabled = false;
+  refreshTools?.();
+  loading({ state: 'compiling', part: 1 });
+  describe();
   showTime();
+  // A link with a time shows that moment.
+  if (wanted && !(source === undefined && query.has('time'))) play();
   tell('loaded', { seconds: duration(), gaussians: about.gaussians });
 }
 
-// The name of the file at an address.
-function nameOf(address) {
-  try {
-    return decodeURIComponent(new URL(address, location.href).pathname.split('/').pop()) || 'capture';
-  } catch {
-    return 'capture';
-  }
+// Shows the title and the count.
+function describe() {
+  const title = (source === undefined && query.get('title')) || name.replace(/\.[a-z0-9]{1,6}$/i, '');
+  at('title').textContent = title;
+  const length = duration() ? `, ${duration().toFixed(1)} s` : '';
+  at('count').textContent = `${about.gaussians.toLocaleString('en')} Gaussians${length}`;
+  at('about').hidden = false;
+  document.title = `${title} - gs4d player`;
 }
 
-// Opens a file at an address.
-async function openAddress(address) {
-  const own = ++turn;
-  try {
-    progress(0);
-    const response = await fetch(address);
-    if (!response.ok) throw new Error(`the server answered ${response.status} ${response.statusText}`);
-    // The length of a compressed answer is not that of the file.
-    const length = response.headers.has('Content-Encoding') ? 0 : Number(response.headers.get('Content-Length')) || 0;
-    await openStream(nameOf(address), response.body, length, own, address);
-  } catch (error) {
-    if (own === turn) refuse(`${address} was not loaded: ${message(error)}`, 'Try again', () => openAddress(address));
-  }
-}
-
-// Opens a file of this computer, and goes on playing.
-async function openFile(file) {
-  if (!file || !player) return;
-  const [own, held, before] = [++turn, playing, about];
-  await openStream(file.name, file.stream(), file.size, own);
-  if (own === turn && about !== before && held) play();
-}
-
-// Links ----------------------------------------------------------------------------------------------------------------
+// Links and the screen -------------------------------------------------------------------------------------------------
 
 function link() {
-  const address = new URL(location.href);
-  address.search = '';
-  if (query.has('engine')) address.searchParams.set('engine', query.get('engine'));
-  if (source) address.searchParams.set('capture', source);
-  address.searchParams.set('time', seconds.toFixed(3));
-  if (orbit) address.searchParams.set('camera', orbit.text());
-  return address.href;
+  return linkTo(query, { source, seconds: duration() ? seconds : null, camera: orbit?.text() ?? null, speed: speed(), background });
 }
 
 async function copyLink() {
@@ -275,18 +287,28 @@ async function copyLink() {
   history.replaceState(null, '', text);
   try {
     await navigator.clipboard.writeText(text);
-    say(source ? 'The link is copied' : 'The link is copied, without the file, which is on this device alone');
+    say(source === null ? 'The link is copied, without the file, which is on this device alone' : 'The link is copied');
   } catch {
     say('The link is in the address bar');
   }
 }
 
 function full() {
+  const refused = () => {
+    say('This page may not fill the screen: the page around has to allow it');
+    tell('error', { message: 'full screen is not allowed' });
+  };
   if (document.fullscreenElement) document.exitFullscreen();
-  else stage.requestFullscreen?.().catch(() => say('This page may not fill the screen'));
+  else if (!document.fullscreenEnabled || !stage.requestFullscreen) refused();
+  else stage.requestFullscreen().catch(refused);
 }
 
 // The user -------------------------------------------------------------------------------------------------------------
+
+let refreshTools = null;
+const pointers = new Map();
+// Whether the wheel is the player's: in a page around it is that page's, until the user clicks here.
+let takesWheel = !framed;
 
 function wake() {
   stage.classList.remove('idle');
@@ -294,40 +316,61 @@ function wake() {
   wake.timer = setTimeout(() => stage.classList.toggle('idle', playing), 3000);
 }
 
-const pointers = new Map();
-
 function spread() {
   const [a, b] = [...pointers.values()];
   return b ? { x: (a.x + b.x) / 2, y: (a.y + b.y) / 2, apart: Math.hypot(a.x - b.x, a.y - b.y) } : { ...a, apart: 0 };
 }
 
-function listen() {
+// Moves of the camera by a pointer are followed at once.
+function drag(event) {
+  if (!pointers.has(event.pointerId) || !orbit) return;
+  const old = spread();
+  pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
+  const now = spread();
+  const [across, down] = [now.x - old.x, now.y - old.y].map((move) => move / canvas.clientHeight);
+  if (pointers.size > 1 || event.shiftKey || event.buttons & 6) orbit.pan(-across, -down);
+  else if (held.size || event.altKey) orbit.look(across, -down);
+  else orbit.turn(-3 * across, 3 * down);
+  if (pointers.size > 1 && now.apart > 0) orbit.zoom(old.apart / now.apart);
+  orbit.jump();
+  [changed, moved] = [true, before];
+}
+
+function wheel(event) {
+  const isOurs = takesWheel || event.ctrlKey || event.metaKey;
+  if (!isOurs && orbit) say('Click first, or hold Ctrl, to zoom with the wheel');
+  if (!isOurs || !orbit?.zoom(Math.exp(Math.min(1, Math.max(-1, event.deltaY / 500))))) return;
+  event.preventDefault();
+  changed = true;
+}
+
+function listenPointers() {
   canvas.addEventListener('pointerdown', (event) => {
     canvas.setPointerCapture(event.pointerId);
+    takesWheel = true;
     pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
   });
-  canvas.addEventListener('pointermove', (event) => {
-    if (!pointers.has(event.pointerId) || !orbit) return;
-    const old = spread();
-    pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
-    const now = spread();
-    const [across, down] = [now.x - old.x, now.y - old.y].map((move) => move / canvas.clientHeight);
-    if (pointers.size > 1 || event.shiftKey || event.buttons & 6) orbit.pan(-across, -down);
-    else orbit.turn(-3 * across, 3 * down);
-    if (pointers.size > 1 && now.apart > 0) orbit.zoom(old.apart / now.apart);
-    changed = true;
-  });
+  canvas.addEventListener('pointermove', drag);
   for (const end of ['pointerup', 'pointercancel']) canvas.addEventListener(end, (event) => pointers.delete(event.pointerId));
+  if (framed) stage.addEventListener('pointerleave', () => (takesWheel = false));
   canvas.addEventListener('contextmenu', (event) => event.preventDefault());
-  canvas.addEventListener('wheel', (event) => {
-    event.preventDefault();
-    orbit?.zoom(Math.exp(Math.min(1, Math.max(-1, event.deltaY / 500))));
-    changed = true;
-  }, { passive: false });
+  canvas.addEventListener('wheel', wheel, { passive: false });
   canvas.addEventListener('dblclick', full);
+}
 
+function listenControls() {
   at('play').onclick = () => play(!playing);
   at('seek').oninput = () => seek(Number(at('seek').value) * duration());
+  at('seek').addEventListener('keydown', (event) => {
+    const far = duration() / 10;
+    const to = { ArrowRight: FRAME, ArrowUp: FRAME, ArrowLeft: -FRAME, ArrowDown: -FRAME, PageUp: far, PageDown: -far, Home: -Infinity, End: Infinity }[event.key];
+    if (to === undefined || event.ctrlKey || event.metaKey || event.altKey) return;
+    event.preventDefault();
+    event.stopPropagation();
+    seek(seconds + to);
+    at('seek').setAttribute('aria-valuetext', at('time').textContent);
+  });
+  at('background').onchange = () => setBackground(at('background').value);
   at('home').onclick = () => act('Home');
   at('open').onclick = () => at('file').click();
   at('file').onchange = () => {
@@ -336,33 +379,59 @@ function listen() {
   };
   at('link').onclick = copyLink;
   at('full').onclick = full;
+  at('cancel').onclick = cancel;
+}
+
+function listenKeys() {
   addEventListener('keydown', (event) => {
     wake();
-    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    if (event.ctrlKey || event.metaKey || event.altKey || at('help').open) return;
+    if (event.key === 'Escape' && !at('message').hidden && !at('close').hidden) return dismiss();
     // Keys of a control that has the focus are its own.
-    const own = event.target.closest?.('select, input, button');
-    if (own && (own.id !== 'seek' || /^(Arrow|Home|End|Page)/.test(event.key)) && /^( |Enter|Arrow|Home|End|Page)/.test(event.key)) return;
+    if (event.target.closest?.('select, input, button') && /^( |Enter|Arrow|Home|End|Page)/.test(event.key)) return;
     if (act(event.key)) event.preventDefault();
   });
+  addEventListener('keyup', (event) => held.delete(event.key.toLowerCase()));
+  addEventListener('blur', () => held.clear());
+}
 
+// Files that are dropped; without a player they are refused, and the page stays.
+function listenDrops() {
   addEventListener('dragover', (event) => {
     event.preventDefault();
-    at('drop').hidden = false;
+    at('drop').hidden = !player;
   });
-  addEventListener('dragleave', (event) => (at('drop').hidden = !event.relatedTarget));
+  addEventListener('dragleave', (event) => (at('drop').hidden = at('drop').hidden || !event.relatedTarget));
   addEventListener('drop', (event) => {
     event.preventDefault();
     at('drop').hidden = true;
     openFile(event.dataTransfer.files[0]);
   });
+}
+
+function listen() {
+  listenPointers();
+  listenControls();
+  listenKeys();
   for (const event of ['pointermove', 'pointerdown', 'focusin']) addEventListener(event, wake);
-  new ResizeObserver(resize).observe(canvas);
-  if (framed) addEventListener('message', (event) => event.source === window.parent && obey(event.data));
+  new ResizeObserver(() => (changed = true)).observe(canvas);
+  listenAround(obedient({ play, seek, setSpeed, setBackground, setCamera, openAddress, openBytes }));
+  for (const id of ['open', 'full', 'background']) at(id).disabled = false;
+  at('background').disabled = !player.set_background;
+  refreshTools = toolbar(at('tools'));
 }
 
 // Does what a key stands for. Returns whether it stands for anything.
 function act(key) {
-  const step = (by) => setSpeed(SPEEDS[Math.min(SPEEDS.length - 1, Math.max(0, SPEEDS.indexOf(Number(at('speed').value)) + by))]);
+  if (Object.hasOwn(FLIGHTS, key.toLowerCase()) && orbit) {
+    held.add(key.toLowerCase());
+    return true;
+  }
+  const faster = (by) => setSpeed(SPEEDS[Math.min(SPEEDS.length - 1, Math.max(0, SPEEDS.indexOf(speed()) + by))]);
+  const nextBackground = () => {
+    const all = Object.keys(BACKGROUNDS);
+    setBackground(all[(all.indexOf(background) + 1) % all.length]);
+  };
   const moves = {
     ArrowLeft: () => orbit?.turn(0.1, 0),
     ArrowRight: () => orbit?.turn(-0.1, 0),
@@ -376,13 +445,15 @@ function act(key) {
     k: () => play(!playing),
     j: () => seek(seconds - duration() / 20),
     ';': () => seek(seconds + duration() / 20),
-    ',': () => (play(false), seek(seconds - 1 / 30)),
-    '.': () => (play(false), seek(seconds + 1 / 30)),
-    '<': () => step(-1),
-    '>': () => step(1),
+    ',': () => (play(false), seek(seconds - FRAME)),
+    '.': () => (play(false), seek(seconds + FRAME)),
+    '<': () => faster(-1),
+    '>': () => faster(1),
+    b: nextBackground,
     f: full,
     o: () => at('file').click(),
     l: copyLink,
+    '?': help,
   };
   const done = Object.hasOwn(moves, key) ? moves[key] : /^[0-9]$/.test(key) ? () => seek((Number(key) / 10) * duration()) : null;
   done?.();
@@ -390,70 +461,76 @@ function act(key) {
   return Boolean(done);
 }
 
-// Does what the page around asks for.
-function obey(data) {
-  const orders = {
-    play: () => play(),
-    pause: () => play(false),
-    seek: () => seek(Number(data.value) || 0),
-    speed: () => setSpeed(Number(data.value) || 1),
-    open: () => {
-      if (typeof data.value === 'string') openAddress(data.value);
-      else if (data.value instanceof ArrayBuffer) openBytes(String(data.name ?? 'capture'), new Uint8Array(data.value));
-    },
-    camera: () => {
-      if (typeof data.value === 'string') orbit?.read(data.value);
-      else orbit?.give(data.value ?? {});
-      changed = true;
-    },
-  };
-  if (data && Object.hasOwn(orders, data.gs4d) && player) orders[data.gs4d]();
-}
-
 // The beginning --------------------------------------------------------------------------------------------------------
 
-const WITHOUT =
-  'This browser has no WebGPU, which draws the capture. Chrome and Edge have it since version 113 (on Android 121), Safari since 26, Firefox since 141 on Windows. It may be switched off, or the graphics driver may be too old.';
+// A poster is of the first view: a link to another one does not show it.
+function showPoster() {
+  if (query.has('time') || query.has('camera')) return;
+  const poster = query.get('poster') ?? (query.has('capture') ? null : 'poster.jpg');
+  if (!poster) return;
+  at('poster').onload = () => (at('poster').hidden = false);
+  at('poster').src = poster;
+}
 
 async function begin() {
-  const poster = query.get('poster') ?? (query.has('capture') ? null : 'poster.jpg');
-  if (poster) {
-    at('poster').onload = () => (at('poster').hidden = false);
-    at('poster').src = poster;
-  }
+  document.documentElement.classList.toggle('framed', framed);
   stage.classList.toggle('bare', query.get('controls') === '0');
-  progress(0);
-  if (!isSecureContext) return refuse('WebGPU needs a page from https:// or from this computer (http://localhost).');
+  at('keys').onclick = help;
+  listenDrops();
+  showPoster();
+  loading({ state: 'starting' });
+  if (!isSecureContext) return fail('WebGPU needs a page from https:// or from this computer (http://localhost).');
   const adapter = await navigator.gpu?.requestAdapter();
-  if (!adapter) return refuse(WITHOUT);
+  if (!adapter) return fail(WITHOUT);
   const engine = query.get('engine') === 'bevy' ? 'player_bevy' : 'player_plain';
   try {
     const { default: init, Player } = await import(`./${engine}.js`);
     const { memory } = await init();
     times.memory = () => memory.buffer.byteLength;
     times.compiled = performance.now();
-    resize();
+    const isSoftware = Boolean(adapter.info?.isFallbackAdapter);
+    const [width, height] = fullSize();
+    const start = isSoftware ? Math.min(1, Math.sqrt(SMALL / (width * height))) : 1;
+    resolution = new Resolution(start, SMALLEST_SIDE / Math.min(width, height));
+    fit(resolution.share(true));
     player = await Player.create(canvas, navigator.gpu.getPreferredCanvasFormat());
     player.resize?.(canvas.width, canvas.height);
     // Software drivers are faster with the other design.
-    const design = query.get('design') ?? (adapter.info?.isFallbackAdapter ? 'sort' : null);
+    const design = query.get('design') ?? (isSoftware ? 'sort' : null);
     if (design) player.set_design?.(design);
     player.set_detail?.(Number(query.get('detail')) || 0);
   } catch (error) {
-    return refuse(`The player did not start: ${message(error)}`, 'Load the page again', () => location.reload());
+    return fail(`The player did not start: ${message(error)}`, { again: 'Load the page again', action: () => location.reload() });
   }
+  opener = new Opener(player, times, report);
   listen();
   requestAnimationFrame(frame);
-  tell('ready');
-  await openAddress(query.get('capture') ?? 'toybox.gs4d');
-  if (!about) return;
-  if (query.has('camera') && !orbit.read(query.get('camera'))) say('The camera of the link is not understood');
+  if (query.has('background') && !setBackground(query.get('background'))) say('The background of the link is not understood');
   if (query.has('speed')) setSpeed(Number(query.get('speed')) || 1);
-  if (query.has('time')) seek(Number(query.get('time')) || 0);
-  else if (query.get('autoplay') !== '0' && !matchMedia('(prefers-reduced-motion: reduce)').matches) play();
+  tell('ready');
+  await first();
+}
+
+// Opens the capture of the query, at its view.
+async function first() {
+  if (!(await openAddress(query.get('capture') ?? 'toybox.gs4d', true))) return;
+  if (query.has('camera') && !orbit.read(query.get('camera'))) say('The camera of the link is not understood');
+  const time = Number(query.get('time') || 'none');
+  if (Number.isFinite(time)) seek(time);
+  else if (query.has('time')) say('The time of the link is not understood');
 }
 
 // For scripts of this page, and tests.
-window.gs4d = { redraw() { changed = true; }, get player() { return player; }, play, seek, setSpeed, openAddress, openBytes, link, obey, times, get about() { return about; }, get seconds() { return seconds; }, get playing() { return playing; } };
+window.gs4d = {
+  play, seek, setSpeed, setBackground, openAddress, openBytes, link, times,
+  redraw: () => (changed = true),
+  get player() { return player; },
+  get about() { return about; },
+  get seconds() { return seconds; },
+  get playing() { return playing; },
+  get settled() { return !orbit || orbit.settled; },
+  get resolution() { return resolution; },
+  get share() { return drawn?.share ?? 0; },
+};
 
 begin();

@@ -8,7 +8,7 @@ use bevy_gs4d::renderer::{
     ViewRenderer,
 };
 use bevy_gs4d::scene::RuntimeScene;
-use bevy_gs4d::view::{Appearance, Background, RasterFov, View};
+use bevy_gs4d::view::{Appearance, Background, Optics, View};
 use glam::{Mat4, UVec2};
 use gs4d_web::{About, Faults, Opening, Step, report_panics, view};
 use std::sync::Arc;
@@ -39,6 +39,8 @@ pub struct Player {
     present: Present,
     opening: Option<Loader>,
     shown: Option<Shown>,
+    /// The background in place of that of the capture.
+    background: Option<[f32; 3]>,
     /// Whether the device has finished the last picture, and whether it has taken what was uploaded.
     finished: Arc<AtomicBool>,
     taken: Arc<AtomicBool>,
@@ -57,7 +59,7 @@ enum Loader {
 struct Kept {
     about: About,
     background: Background,
-    raster_fov: RasterFov,
+    optics: Optics,
 }
 
 /// The capture that is shown.
@@ -72,8 +74,9 @@ impl Shown {
         Instance { capture: &self.capture, active: self.active.as_ref(), view, appearance: Appearance::default() }
     }
 
-    fn parameters(&self) -> ViewParameters<'static> {
-        ViewParameters { background: self.kept.background, depths: false, ..ViewParameters::default() }
+    fn parameters(&self, background: Option<[f32; 3]>) -> ViewParameters<'static> {
+        let background = background.map_or(self.kept.background, Background::Color);
+        ViewParameters { background, depths: false, ..ViewParameters::default() }
     }
 }
 
@@ -113,9 +116,22 @@ impl Player {
         surface.configure(device, &configuration);
         let view = ViewRenderer::new(device, &renderer);
         let present = Present::new(device, format);
-        let (opening, shown) = (None, None);
+        let (opening, shown, background) = (None, None, None);
         let [finished, taken] = [true; 2].map(|done| Arc::new(AtomicBool::new(done)));
-        Ok(Self { context, faults, surface, configuration, renderer, view, present, opening, shown, finished, taken })
+        Ok(Self {
+            context,
+            faults,
+            surface,
+            configuration,
+            renderer,
+            view,
+            present,
+            opening,
+            shown,
+            background,
+            finished,
+            taken,
+        })
     }
 
     /// Sets the size of the pictures to that of the canvas, pixels.
@@ -124,6 +140,11 @@ impl Player {
         let size = UVec2::new(width, height).clamp(UVec2::ONE, UVec2::splat(limit));
         (self.configuration.width, self.configuration.height) = (size.x, size.y);
         self.surface.configure(&self.context.device, &self.configuration);
+    }
+
+    /// Sets the background: three numbers from 0 to 1, sRGB-encoded; without them, that of the capture.
+    pub fn set_background(&mut self, color: Option<Vec<f32>>) {
+        self.background = color.and_then(|color| color.try_into().ok());
     }
 
     /// Chooses the design of the renderer by its name.
@@ -173,7 +194,7 @@ impl Player {
                 let kept = Kept {
                     about: About::of(&scene),
                     background: scene.trained_background(),
-                    raster_fov: scene.trained_with.raster_fov,
+                    optics: scene.trained_with.optics(),
                 };
                 let upload = CaptureUpload::new(device, &self.renderer, *scene).map_err(|e| e.to_string())?;
                 ViewRenderer::check_room(device, upload.most_drawn()).map_err(|e| e.to_string())?;
@@ -205,9 +226,9 @@ impl Player {
             Some(Loader::Uploaded(shown)) => {
                 // The passes are compiled here, so that the first picture does not take long.
                 let size = UVec2::new(self.configuration.width, self.configuration.height);
-                let view = view(&Mat4::IDENTITY.to_cols_array(), &[0.5, 0.5], size, 0.0, shown.kept.raster_fov)?;
+                let view = view(&Mat4::IDENTITY.to_cols_array(), &[0.5, 0.5], size, 0.0, shown.kept.optics)?;
                 let prepared =
-                    self.view.prepare(device, queue, &self.renderer, &[shown.instance(view)], &shown.parameters());
+                    self.view.prepare(device, queue, &self.renderer, &[shown.instance(view)], &shown.parameters(self.background));
                 prepared.map_err(|e| e.to_string())?;
                 let about = shown.kept.about.clone();
                 self.shown = Some(*shown);
@@ -247,14 +268,14 @@ impl Player {
         let Some(shown) = &mut self.shown else { return Ok(()) };
         let GpuContext { device, queue, .. } = &self.context;
         let size = UVec2::new(self.configuration.width, self.configuration.height);
-        let view = view(pose, lens, size, time, shown.kept.raster_fov)?;
+        let view = view(pose, lens, size, time, shown.kept.optics)?;
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("gs4d page") });
         if let Some(active) = &mut shown.active
             && active.prepare(queue, &shown.capture, time)
         {
             active.record(&self.renderer, &mut encoder, &shown.capture);
         }
-        let (instances, parameters) = ([shown.instance(view)], shown.parameters());
+        let (instances, parameters) = ([shown.instance(view)], shown.parameters(self.background));
         self.view.prepare(device, queue, &self.renderer, &instances, &parameters).map_err(|e| e.to_string())?;
         self.view.record(&self.renderer, &mut encoder, &instances);
         let canvas = match self.surface.get_current_texture() {

@@ -37,6 +37,9 @@ struct State {
     scene: Option<Box<RuntimeScene>>,
     shot: Option<Shot>,
     detail: f32,
+    /// The background in place of that of the capture, which is `trained`.
+    background: Option<[f32; 3]>,
+    trained: [f32; 3],
     /// From the app: whether the scene is shown, why not, the frames until the last picture is on the canvas, and whether only the device has
     /// to finish it.
     shown: bool,
@@ -79,7 +82,7 @@ impl Player {
                     .set(WindowPlugin { primary_window: Some(window), ..default() })
                     // A server answers a request for a file that is not there with an error in the console.
                     .set(AssetPlugin { meta_check: AssetMetaCheck::Never, ..default() }),
-                GaussianCapturePlugin,
+                GaussianCapturePlugins,
             ))
             .insert_resource(shared.clone())
             .insert_resource(ClearColor(Color::BLACK))
@@ -92,6 +95,11 @@ impl Player {
     /// Sets the bias of the level of detail: captures count as two to this power as large.
     pub fn set_detail(&mut self, bias: f32) {
         self.shared.state().detail = bias;
+    }
+
+    /// Sets the background: three numbers from 0 to 1, sRGB-encoded; without them, that of the capture.
+    pub fn set_background(&mut self, color: Option<Vec<f32>>) {
+        self.shared.state().background = color.and_then(|color| color.try_into().ok());
     }
 
     /// Begins to open a file, whose length is 0 if it is not known. The capture that is shown stays until the file is open.
@@ -190,12 +198,16 @@ fn obey(
 ) {
     let mut state = shared.state();
     detail.bias = state.detail;
+    let [red, green, blue] = state.background.unwrap_or(state.trained);
+    let color = Color::srgb(red, green, blue);
+    if clear.0 != color {
+        clear.0 = color;
+    }
     if let Some(scene) = state.scene.take() {
         for (entity, ..) in &shown {
             commands.entity(entity).despawn();
         }
-        let [red, green, blue] = scene.trained_with.background;
-        clear.0 = Color::srgb(red, green, blue);
+        state.trained = scene.trained_with.background;
         let capture = captures.add(GaussianCapture::new(*scene));
         commands.spawn((GaussianCapture3d(capture), Playback { playing: false, ..default() }));
         return;
@@ -203,8 +215,8 @@ fn obey(
     let Ok((_, GaussianCapture3d(capture), loaded, mut playback)) = shown.single_mut() else { return };
     match loaded {
         CaptureState::Ready => state.shown = true,
-        CaptureState::Failed(message) if !state.shown => state.failed = Some(message.clone()),
-        CaptureState::Loading | CaptureState::Failed(_) => {}
+        CaptureState::Failed(failure) if !state.shown => state.failed = Some(failure.to_string()),
+        _ => {}
     }
     if state.left > 1 {
         state.left -= 1;

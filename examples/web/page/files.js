@@ -1,0 +1,156 @@
+// Files of captures: from an address or this device into the player.
+// In: an address, a file, bytes. Out: what there is to tell about the capture once it is shown; progress; a sentence that says what was wrong and what to do.
+
+// Milliseconds of a slice of loading: the page draws and answers between slices.
+const SLICE = 8;
+
+// A file that was not opened; `again` is whether trying again can help.
+export class Refusal extends Error {
+  constructor(text, again = false) {
+    super(text);
+    this.again = again;
+  }
+}
+
+export const megabytes = (bytes) => `${(bytes / 1e6).toFixed(bytes < 1e7 ? 1 : 0)} MB`;
+
+const channel = new MessageChannel();
+channel.port1.start();
+
+// Lets the page draw and answer.
+function pause() {
+  return new Promise((resolve) => {
+    channel.port1.addEventListener('message', resolve, { once: true });
+    channel.port2.postMessage(null);
+  });
+}
+
+// The name of the file at an address.
+export function nameOf(address) {
+  try {
+    return decodeURIComponent(new URL(address, location.href).pathname.split('/').pop()) || 'capture';
+  } catch {
+    return 'capture';
+  }
+}
+
+// Why an address gave no answer.
+async function unanswered(url, signal) {
+  if (!navigator.onLine) return 'this device is offline';
+  if (location.protocol === 'https:' && url.protocol === 'http:') return 'a page from https:// may not load from http://: use an https:// address';
+  const answers = url.origin === location.origin ? false : await fetch(url, { mode: 'no-cors', method: 'HEAD', signal }).then(() => true, () => false);
+  return answers
+    ? `${url.host} answers, but does not let other pages read its files: its answers need the header Access-Control-Allow-Origin: ${location.origin} (or *)`
+    : `${url.host} does not answer: the address may be wrong, or the server is down`;
+}
+
+// Asks for an address. Returns the stream of the file and its length, 0 if it is not known.
+export async function request(address, signal) {
+  let url;
+  try {
+    url = new URL(address, location.href);
+  } catch {
+    throw new Refusal(`"${address}" is no address`);
+  }
+  const response = await fetch(url, { signal }).catch(async (error) => {
+    if (signal.aborted) throw error;
+    throw new Refusal(`${address} was not loaded: ${await unanswered(url, signal)}.`, true);
+  });
+  if (!response.ok) throw new Refusal(`${address} was not loaded: the server answered ${response.status} ${response.statusText}.`, true);
+  // The length of a compressed answer is not that of the file.
+  const length = response.headers.has('Content-Encoding') ? 0 : Number(response.headers.get('Content-Length')) || 0;
+  return { stream: response.body, length };
+}
+
+// What a beginning shows a file to be that is certainly none of a capture.
+function misnomer(bytes) {
+  const text = new TextDecoder('latin1').decode(bytes.subarray(0, 512)).replace(/^\u00ef\u00bb\u00bf/, '').trimStart().toLowerCase();
+  const isPage = text.startsWith('<!doctype html') || text.startsWith('<html') || text.startsWith('<head');
+  return isPage ? 'is a web page, not a capture: the address of the file itself is needed (a page about it, or one that asks to sign in, was sent)' : '';
+}
+
+// Opens files in a player, one at a time: a file replaces one that is still being opened.
+export class Opener {
+  // `report` gets the progress; `times.longestSlice` is kept.
+  constructor(player, times, report) {
+    Object.assign(this, { player, times, report, own: null });
+  }
+
+  // Ends what is being opened.
+  cancel() {
+    this.own?.abort();
+    this.own = null;
+  }
+
+  get busy() {
+    return Boolean(this.own);
+  }
+
+  // Does a part of the loading, whose time counts.
+  slice(work) {
+    const start = performance.now();
+    const result = work(() => performance.now() - start < SLICE);
+    this.times.longestSlice = Math.max(this.times.longestSlice, performance.now() - start);
+    return result;
+  }
+
+  // Opens the file whose stream and length a promise gives. Returns what there is to tell about it; null if it was cancelled or replaced.
+  async open(name, begin) {
+    this.cancel();
+    const own = new AbortController();
+    this.own = own;
+    try {
+      this.report({ name, part: 0, bytes: 0, total: 0, state: 'receiving' });
+      const { stream, length } = await begin(own.signal);
+      if (own.signal.aborted) return null;
+      await this.receive(name, stream, length, own.signal);
+      return own.signal.aborted ? null : await this.read(name, own.signal);
+    } catch (error) {
+      if (own.signal.aborted) return null;
+      throw error instanceof Refusal ? error : new Refusal(`${name} was not opened: ${typeof error === 'string' ? error : (error?.message ?? error)}`);
+    } finally {
+      if (this.own === own) this.own = null;
+    }
+  }
+
+  async receive(name, stream, length, signal) {
+    const reader = stream.getReader();
+    signal.addEventListener('abort', () => reader.cancel().catch(() => {}), { once: true });
+    this.slice(() => this.player.open(name, length));
+    let received = 0;
+    const cut = () => {
+      const of = length ? ` of ${megabytes(length)}` : '';
+      return new Refusal(`${name} was not opened: the connection ended after ${megabytes(received)}${of}.`, true);
+    };
+    for (;;) {
+      const { done, value } = await reader.read().catch((error) => {
+        if (signal.aborted) throw error;
+        throw cut();
+      });
+      if (signal.aborted) return;
+      if (done) break;
+      const wrong = received === 0 ? misnomer(value) : '';
+      if (wrong) throw new Refusal(`${name} ${wrong}.`);
+      this.slice(() => this.player.receive(value));
+      received += value.length;
+      this.report({ name, part: length ? 0.7 * Math.min(1, received / length) : 0.35, bytes: received, total: length, state: 'receiving' });
+    }
+    if (received === 0) throw new Refusal(`${name} is empty: it has no byte.`);
+    if (received < length) throw cut();
+  }
+
+  async read(name, signal) {
+    for (;;) {
+      const found = this.slice((hasTime) => {
+        let step;
+        do step = this.player.step();
+        while (!step && !this.player.waits() && hasTime());
+        return step;
+      });
+      if (found) return found;
+      this.report({ name, part: 0.7 + 0.29 * this.player.progress(), state: 'reading' });
+      await (this.player.waits() ? new Promise((resolve) => setTimeout(resolve, 1)) : pause());
+      if (signal.aborted) return null;
+    }
+  }
+}
