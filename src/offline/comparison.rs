@@ -6,6 +6,7 @@
 use super::OfflineError;
 use super::metrics::{ImageMetrics, MetricSet};
 use super::picture_file;
+use crate::codec::hidden::is_hidden;
 use crate::view::Picture;
 use glam::{UVec2, Vec3};
 use std::collections::BTreeMap;
@@ -82,7 +83,8 @@ fn pictures(folder: &Path, with_raw: bool) -> Result<BTreeMap<OsString, PathBuf>
     for entry in fs::read_dir(folder).map_err(|error| OfflineError::at(folder, error))? {
         let path = entry.map_err(|error| OfflineError::at(folder, error))?.path();
         let raw = is_raw(&path);
-        let Some(stem) = path.file_stem().filter(|_| is_picture(&path) || (raw && with_raw)) else {
+        let is_wanted = is_picture(&path) || (raw && with_raw);
+        let Some(stem) = path.file_stem().filter(|_| is_wanted && !path.file_name().is_some_and(is_hidden)) else {
             continue;
         };
         match found.get(stem) {

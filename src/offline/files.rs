@@ -4,6 +4,7 @@
 //! files that killed runs have left beside the outputs are removed.
 
 use super::dataset::{CameraFile, CameraOptions, Split, inputs};
+use super::node::node;
 use super::save::{is_stream, resolved};
 use super::temporary_file::folder_of;
 use super::{OfflineError, temporary_file};
@@ -258,19 +259,6 @@ fn is_device(metadata: &Metadata) -> bool {
 #[cfg(not(unix))]
 fn is_device(_: &Metadata) -> bool {
     false
-}
-
-/// Returns the device of a file and its number there; `None` where the system has no such numbers.
-#[cfg(unix)]
-pub(super) fn node(metadata: &Metadata) -> Option<(u64, u64)> {
-    use std::os::unix::fs::MetadataExt;
-    Some((metadata.dev(), metadata.ino()))
-}
-
-/// Returns the device of a file and its number there; `None` where the system has no such numbers.
-#[cfg(not(unix))]
-pub(super) fn node(_: &Metadata) -> Option<(u64, u64)> {
-    None
 }
 
 #[cfg(test)]

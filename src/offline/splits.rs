@@ -10,7 +10,7 @@ use super::dataset::selection::even_subset;
 use super::dataset::validation::{HeldOut, Validation, hold_out};
 use super::dataset::{CameraOptions, Clock, Dataset, DatasetError, Split, TrainingView};
 use super::progress::Progress;
-use crate::scene::TrainedWith;
+use crate::scene::{Origin, TrainedWith};
 use glam::UVec2;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -35,6 +35,16 @@ pub struct SplitOptions {
     pub resolution: Option<i32>,
     /// How validation views are found.
     pub validation: Validation,
+    /// Whether the scene is at rest: every view has time 0.
+    pub is_static: bool,
+}
+
+impl SplitOptions {
+    /// Returns how cameras are read, with all times and an origin of their own.
+    fn cameras(&self) -> CameraOptions {
+        let Self { size, resolution, is_static, .. } = *self;
+        CameraOptions { size, resolution, is_static, ..CameraOptions::default() }
+    }
 }
 
 /// The views of a dataset by purpose.
@@ -72,7 +82,8 @@ impl Splits {
             Some(validation) => HeldOut { train: views, validation, by: Validation::File },
             None => hold_out(&views, options.validation).ok_or_else(|| {
                 let message = format!(
-                    "does not allow --validation {}: it has too few cameras or times, or no split val of its own",
+                    "does not allow --validation {}: it has too few cameras or times, or no split val of its own; give \
+                     --validation auto",
                     options.validation
                 );
                 OfflineError::at(folder, message)
@@ -155,7 +166,22 @@ impl fmt::Display for Splits {
     }
 }
 
-/// Opens a split. Views outside the time interval are dropped, as in training, and their number is reported as a note.
+/// Returns the origin of a capture that is trained on a dataset, and reports as notes what was assumed of the dataset.
+///
+/// # Errors
+/// A training split that is missing or cannot be used.
+pub(crate) fn origin_of(
+    folder: &Path,
+    options: &SplitOptions,
+    progress: &mut dyn Progress,
+) -> Result<Origin, DatasetError> {
+    let found = Dataset::look(folder, Split::Train, &options.cameras())?;
+    found.note(progress);
+    Ok(found.origin)
+}
+
+/// Opens a split for a capture, from whose origin places and times are counted. Views outside the time interval are dropped, as in training, and their
+/// number is reported as a note, as is what was assumed of the dataset.
 ///
 /// # Errors
 /// A split that is missing or cannot be used.
@@ -166,8 +192,9 @@ pub fn open_split(
     trained_with: &TrainedWith,
     progress: &mut dyn Progress,
 ) -> Result<Dataset, DatasetError> {
-    let options = CameraOptions { size: options.size, resolution: options.resolution, time_interval: None };
+    let options = CameraOptions { origin: Some(trained_with.origin), ..options.cameras() };
     let all = Dataset::open_telling(folder, split, &options, progress)?;
+    all.note(progress);
     let [first, last] = trained_with.time_interval;
     let outside = all.views.iter().filter(|view| !(first..=last).contains(&view.time)).count();
     if outside == 0 {

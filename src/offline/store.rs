@@ -5,7 +5,7 @@
 //! stages, of which one at a time works on a stage.
 
 use super::dataset::{Correction, TrainingView};
-use super::files::node;
+use super::node::node;
 use super::temporary_file;
 use crate::codec::CodecError;
 use crate::offline::{OfflineError, Progress, proceed, unfinished, write_beside};

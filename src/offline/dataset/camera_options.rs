@@ -3,9 +3,10 @@
 //! In: what a caller asks for. Out: [`CameraOptions`], or an error for a size that no picture has.
 
 use super::{DatasetError, MAX_SIDE};
+use crate::scene::Origin;
 use glam::UVec2;
 
-/// How to read a camera file. Default: all `None`.
+/// How to read a camera file. Default: all `None`, times as the files say.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct CameraOptions {
     /// Picture size in pixels, instead of the size in the file. The field of view stays that of the original pictures on both
@@ -14,8 +15,13 @@ pub struct CameraOptions {
     /// The value of `--resolution` of the original: 1, 2, 3, 4 or 8 divide the size, −1 limits the width to 1600 pixels, any other
     /// number is a target width. It has no effect on golden views or with an explicit `size`.
     pub resolution: Option<i32>,
-    /// First and last time, both included: frames outside are dropped.
+    /// First and last time of the views, both included: frames outside are dropped. They are counted from the origin, as the times of views are.
     pub time_interval: Option<[f32; 2]>,
+    /// Whether the scene is at rest: every view has time 0, and images in subfolders of a COLMAP dataset are no frames of cameras.
+    pub is_static: bool,
+    /// The origin from which places and times of views are counted, in the coordinates of the files: that of the capture that the views are for. `None`:
+    /// zeros, unless the cameras or the times are so far from 0 that single precision would lose their digits; then their center, or the first time.
+    pub origin: Option<Origin>,
 }
 
 /// Checks a requested picture size.

@@ -9,12 +9,20 @@ use super::division::divide;
 use super::error::DatasetError;
 use super::files::require_files;
 use super::format::{self, Format, Reader};
+use super::origin;
+use super::placing::Placed;
 use super::point_cloud::BESIDE;
 use super::split::Split;
 use super::video::Videos;
 use super::view::TrainingView;
 use crate::offline::{NoProgress, Progress};
+use crate::scene::Origin;
+use std::mem::take;
 use std::path::{Path, PathBuf};
+
+/// The note about the test views of the scene `lego`.
+const LEGO: &str = "its test views are those of transforms_val.json, not of transforms_test.json, as in the original for folders whose name ends in lego: \
+                    rename the folder if it is another scene";
 
 /// One split of a dataset folder.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,6 +35,10 @@ pub struct Dataset {
     pub views: Vec<TrainingView>,
     /// File of points to begin training with, if the dataset names or has one. It may not exist.
     pub points: Option<PathBuf>,
+    /// What was assumed or left out when the folder was read, a sentence each.
+    pub notes: Vec<String>,
+    /// The origin of the views in the coordinates of the files, the same for all splits: places and times of views are counted from it.
+    pub origin: Origin,
     /// What the times of the views mean.
     pub(crate) clock: Clock,
 }
@@ -63,29 +75,44 @@ impl Dataset {
 
     fn open_as(folder: &Path, split: Split, options: &CameraOptions, videos: Videos<'_>) -> Result<Self, DatasetError> {
         options.size.map_or(Ok(()), check_size)?;
+        // The interval of a scene at rest is that of times that are not used.
+        let time_interval = options.time_interval.filter(|_| !options.is_static);
+        let mut dataset = Self::read(folder, split, &CameraOptions { time_interval, ..*options }, videos)?;
+        if options.is_static {
+            dataset.clock = Clock::default();
+        }
+        if options.origin.is_none() {
+            dataset.notes.extend(origin::notes(&dataset.origin));
+        }
+        Ok(dataset)
+    }
+
+    fn read(folder: &Path, split: Split, options: &CameraOptions, videos: Videos<'_>) -> Result<Self, DatasetError> {
         let Format { reader, .. } = format::of(folder).ok_or_else(|| not_a_dataset(folder, split))?;
         match reader {
             Reader::Splits => Self::open_split(folder, split, options),
             Reader::Whole(read) => {
-                let all = read(folder, options, videos)?;
-                let points = all.points.clone();
-                let clock = all.clock;
-                Ok(Self { folder: folder.to_owned(), split, views: divide(split, options, all)?, points, clock })
+                let mut all = read(folder, options, videos)?;
+                let (points, clock, notes, origin) = (all.points.take(), all.clock, take(&mut all.notes), all.origin);
+                let (folder, views) = (folder.to_owned(), divide(split, options, all)?);
+                Ok(Self { folder, split, views, points, notes, origin, clock })
             }
         }
     }
 
     /// Reads one split from its own camera file.
-    fn open_split(folder: &Path, split: Split, options: &CameraOptions) -> Result<Self, DatasetError> {
-        let split = split.resolved(folder);
+    fn open_split(folder: &Path, wanted: Split, options: &CameraOptions) -> Result<Self, DatasetError> {
+        let split = wanted.resolved(folder);
         let path = folder.join(split.file_name());
         if !path.is_file() {
             return Err(DatasetError::NoSplit { folder: folder.to_owned(), file: split.file_name() });
         }
         let points = Some(folder.join(BESIDE)).filter(|points| points.is_file());
         let file = CameraFile::read(&path)?;
-        let (views, clock) = (file.views(options)?, file.clock());
-        Ok(Self { folder: folder.to_owned(), split, views, points, clock })
+        let origin = options.origin.or(file.common_origin(folder, split, options.is_static)?);
+        let Placed { views, origin, mut notes } = file.views(&CameraOptions { origin, ..*options })?;
+        notes.extend((split != wanted).then(|| LEGO.to_owned()));
+        Ok(Self { folder: folder.to_owned(), split, views, points, notes, origin, clock: file.clock() })
     }
 
     /// Returns whether a folder has views of a split.
@@ -100,6 +127,11 @@ impl Dataset {
     /// Returns the name of the format of a folder; `None` if it has none.
     pub(crate) fn format(folder: &Path) -> Option<&'static str> {
         format::of(folder).map(|format| format.name)
+    }
+
+    /// Reports what was assumed or left out, a note each.
+    pub(crate) fn note(&self, progress: &mut dyn Progress) {
+        self.notes.iter().for_each(|note| progress.note(&format!("note: {}: {note}", self.folder.display())));
     }
 
     /// Checks that every image and mask is on disk.

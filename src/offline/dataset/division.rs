@@ -16,7 +16,7 @@ const SAME: f32 = 1e-5;
 
 /// Returns the views of a split inside the time interval of the options.
 pub(super) fn divide(split: Split, options: &CameraOptions, all: Undivided) -> Result<Vec<TrainingView>, DatasetError> {
-    let Undivided { source, views, splits, .. } = all;
+    let Undivided { source, views, splits, origin, .. } = all;
     let cameras = distinct_cameras(&views);
     match &views[..] {
         [] => return Err(DatasetError::NoFrames { path: source }),
@@ -48,7 +48,8 @@ pub(super) fn divide(split: Split, options: &CameraOptions, all: Undivided) -> R
     if let Some(interval @ [start, end]) = options.time_interval {
         of_split.retain(|view| (start..=end).contains(&view.time));
         if of_split.is_empty() {
-            return Err(DatasetError::NoFramesInInterval { path: source, interval, times: [first, last] });
+            let (times, origin) = ([first, last], origin.time);
+            return Err(DatasetError::NoFramesInInterval { path: source, interval, times, origin });
         }
     }
     Ok(of_split)

@@ -3,6 +3,7 @@
 //! In: a file, a frame, a reason. Out: a [`DatasetError`], whose message names the file, the frame if there is one, the
 //! reason and the remedy.
 
+use std::borrow::Cow;
 use std::path::PathBuf;
 use std::{fmt, io};
 
@@ -68,16 +69,18 @@ pub enum DatasetError {
     },
     /// Every frame lies outside the time interval.
     #[error(
-        "{}: all frames lie outside the time interval {},{}: their times are {} to {}; pass the interval the capture was trained with",
-        .path.display(), .interval[0], .interval[1], .times[0], .times[1]
+        "{}: all frames lie outside the time interval {},{}: their times are {} to {}{}; pass the interval the capture was trained with",
+        .path.display(), .interval[0], .interval[1], .times[0], .times[1], Counted(*.origin)
     )]
     NoFramesInInterval {
         /// The camera file.
         path: PathBuf,
-        /// The requested interval.
+        /// The requested interval, counted from the origin.
         interval: [f32; 2],
-        /// First and last time found.
+        /// First and last time found, counted from the origin.
         times: [f32; 2],
+        /// The time of the dataset from which times are counted.
+        origin: f64,
     },
     /// One frame cannot be used.
     #[error("{}: frame {frame}: {problem}", .path.display())]
@@ -117,7 +120,7 @@ pub enum DatasetError {
         original: UVec2,
     },
     /// Images named by the camera file are not on disk.
-    #[error("{missing} of {total} images are missing: {}; put them beside the camera file", Listing(.first, *.missing))]
+    #[error("{missing} of {total} images are missing: {} ({LOOKED_FOR}): put them there", Listing(.first, *.missing))]
     MissingImages {
         /// The first few missing images.
         first: Vec<PathBuf>,
@@ -176,6 +179,14 @@ pub enum DatasetError {
         /// The split.
         split: Split,
     },
+    /// A frame that was decoded from a video cannot be used.
+    #[error("{reason}: delete {}, so that the frames are decoded from the videos again", .folder.display())]
+    Decoded {
+        /// The fault of the frame.
+        reason: Box<PictureError>,
+        /// The folder of all frames that were decoded from the videos of the dataset.
+        folder: PathBuf,
+    },
     /// An image cannot be decoded, or is larger than the camera file says.
     #[error(transparent)]
     Image(#[from] PictureError),
@@ -193,9 +204,24 @@ pub enum FrameProblem {
     /// The time does not fit a float32.
     #[error("the time {0:?} is not a usable number")]
     Time(f64),
+    /// A frame has no time, and others have one.
+    #[error(
+        "\"{0}\" has no \"time\", and other frames of the dataset have one: add the time, or remove those of all frames (--static reads every frame at time 0)"
+    )]
+    NoTime(String),
     /// The camera's matrix is not a pose.
     #[error("the camera matrix {0}")]
-    Matrix(&'static str),
+    Matrix(Cow<'static, str>),
+    /// The camera's matrix has another scale than those of other frames.
+    #[error(
+        "the axes of the camera have the length {found}, and those of most cameras {usual}: write rotations without a scale, or with one scale for all"
+    )]
+    Scale {
+        /// Length of the axes in units of the world.
+        found: f64,
+        /// The length for most frames.
+        usual: f64,
+    },
     /// Neither intrinsics nor a field of view.
     #[error("no lens: give camera_angle_x, or all of fl_x, fl_y, cx and cy, for the frame or the whole file")]
     NoLens,
@@ -207,11 +233,13 @@ pub enum FrameProblem {
     Lens,
     /// An entry describes the picture of a camera that is not a pinhole camera.
     #[error(
-        "{entry} is not 0, and a distorted picture cannot be used: {UNDISTORT}; then remove {entry}, or set it to 0"
+        "{entry} is not 0 but {value}, and a distorted picture cannot be used: {UNDISTORT}; then remove {entry}, or set it to 0"
     )]
     Distorted {
         /// Name of the entry.
         entry: &'static str,
+        /// Its value, as JSON.
+        value: String,
     },
     /// The distortion cannot be undone.
     #[error(
@@ -254,8 +282,21 @@ pub enum FrameProblem {
     },
 }
 
+/// The names under which a missing image was looked for.
+pub(super) const LOOKED_FOR: &str =
+    "looked for by these names, in any letter case, and with the extensions png, jpg, jpeg, exr and webp";
+
 /// The remedy for pictures of a lens that is not a pinhole.
 const UNDISTORT: &str = "undistort the images first, as COLMAP's image_undistorter does";
+
+/// Prints the time from which times are counted, unless it is 0.
+struct Counted(f64);
+
+impl fmt::Display for Counted {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.0 == 0.0 { Ok(()) } else { write!(f, ", counted from the time {} of the dataset", self.0) }
+    }
+}
 
 /// Prints some of `total` paths.
 struct Listing<'a>(&'a [PathBuf], usize);

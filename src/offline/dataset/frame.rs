@@ -1,14 +1,15 @@
 //! One frame of a dataset, before the size of its picture is chosen.
 //!
-//! In: what a file says of a frame. Out: its [`TrainingView`] at the size to render.
+//! In: what a file says of a frame, in double precision. Out: its [`TrainingView`] at the size to render, in single precision, counted from an origin.
 
 use super::distortion::{Distortion, Undistortion};
 use super::lens::{OriginalLens, reduced};
 use super::view::Correction;
-use super::{CameraOptions, DatasetError, FrameProblem, TrainingView};
+use super::{CameraOptions, DatasetError, FrameProblem, TrainingView, pose};
 use crate::codec::text::is_obeyed;
+use crate::scene::Origin;
 use crate::view::{Camera, RasterFov};
-use glam::{DVec2, Mat4, UVec2};
+use glam::{DMat4, DVec2, DVec3, UVec2};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
@@ -19,8 +20,10 @@ pub(super) struct Frame {
     pub name: String,
     pub image: PathBuf,
     pub mask: Option<Mask>,
-    pub time: f32,
-    pub world_to_camera: Mat4,
+    /// As the file counts it.
+    pub time: f64,
+    /// From the coordinates of the file.
+    pub world_to_camera: DMat4,
     pub lens: OriginalLens,
     pub distortion: Distortion,
 }
@@ -34,12 +37,13 @@ pub(super) struct Mask {
 }
 
 impl Frame {
-    /// Returns the view of a frame whose original picture has this size. `reducible` is false if the resolution has no effect.
+    /// Returns the view of a frame whose original picture has this size, counted from an origin. `reducible` is false if the resolution has no effect.
     pub(super) fn into_view(
         self,
         original: UVec2,
         options: &CameraOptions,
         reducible: bool,
+        origin: &Origin,
         failed: impl Fn(FrameProblem) -> DatasetError,
     ) -> Result<TrainingView, DatasetError> {
         let (size, divisor) = match options.size {
@@ -50,19 +54,25 @@ impl Frame {
             }
             None => (original, DVec2::ONE),
         };
+        let world_to_camera = pose::counted_from(DVec3::from(origin.place), self.world_to_camera);
+        let world_to_camera = pose::single_precision(world_to_camera).map_err(&failed)?;
+        let time = (self.time - origin.time) as f32;
+        if !time.is_finite() {
+            return Err(failed(FrameProblem::Time(self.time)));
+        }
         let full = self.lens.scaled(original, DVec2::ONE).map_err(&failed)?;
         let lens = self.lens.scaled(original, divisor).map_err(&failed)?;
         let undistortion = Undistortion::new(self.distortion, full, original).map_err(&failed)?;
         let lens = undistortion.map_or(lens, |undistortion| undistortion.pinhole(lens));
-        let camera = Camera { world_to_camera: self.world_to_camera, size, lens };
-        let is_finite = |fov| camera.view(self.time, fov).is_finite();
+        let camera = Camera { world_to_camera, size, lens };
+        let is_finite = |fov: RasterFov| camera.view(time, fov).is_finite();
         if ![RasterFov::Reference, RasterFov::Corrected].into_iter().all(is_finite) {
             return Err(failed(FrameProblem::Projection(self.name)));
         }
         Ok(TrainingView {
             name: self.name,
             camera,
-            time: self.time,
+            time,
             original,
             image: self.image,
             correction: Correction { undistortion, masks: self.mask.as_ref().is_some_and(|mask| !mask.applied) },

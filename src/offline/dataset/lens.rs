@@ -136,10 +136,8 @@ pub(super) fn check_pinhole(frame: &Value, file: &Value) -> Result<(), FrameProb
             return Err(FrameProblem::CameraModel(printable(&shown)));
         }
     }
-    match DISTORTING.into_iter().find(|name| entry(name).is_some_and(|value| !is_zero(value))) {
-        Some(entry) => Err(FrameProblem::Distorted { entry }),
-        None => Ok(()),
-    }
+    let refused = |name: &'static str| Some((name, entry(name).filter(|value| !is_zero(value))?));
+    DISTORTING.into_iter().find_map(refused).map_or(Ok(()), |(name, value)| Err(distorted(name, value)))
 }
 
 /// Returns the distortion of a frame of the Blender form. An entry of the frame replaces the entry of the whole file; `null` is no entry.
@@ -152,10 +150,10 @@ pub(super) fn distortion(frame: &Value, file: &Value) -> Result<Distortion, Fram
         return Ok(Distortion::default());
     };
     let undone = |name: &str| COEFFICIENTS.contains(&name) && !(fisheye && name.starts_with('p'));
-    let refused =
-        |name: &'static str| entry(name).is_some_and(|value| !(is_zero(value) || undone(name) && value.is_number()));
-    if let Some(entry) = DISTORTING.into_iter().find(|&name| refused(name)) {
-        return Err(FrameProblem::Distorted { entry });
+    let is_refused = |name: &str, value: &Value| !(is_zero(value) || undone(name) && value.is_number());
+    let refused = |name: &'static str| Some((name, entry(name).filter(|value| is_refused(name, value))?));
+    if let Some((name, value)) = DISTORTING.into_iter().find_map(refused) {
+        return Err(distorted(name, value));
     }
     let value = |name| entry(name).and_then(Value::as_f64).unwrap_or(0.0);
     Ok(Distortion {
@@ -164,6 +162,10 @@ pub(super) fn distortion(frame: &Value, file: &Value) -> Result<Distortion, Fram
         denominator: [0.0; 3],
         tangential: if fisheye { [0.0; 2] } else { ["p1", "p2"].map(value) },
     })
+}
+
+fn distorted(entry: &'static str, value: &Value) -> FrameProblem {
+    FrameProblem::Distorted { entry, value: printable(&value.to_string()) }
 }
 
 fn is_zero(value: &Value) -> bool {

@@ -7,7 +7,7 @@
 //! | Blender (D-NeRF) | `transforms_{train,test,val}.json` with `camera_angle_x`: FoV cameras; with `fl_x`, `fl_y`, `cx`, `cy` for the file or per frame: intrinsics cameras | a file each |
 //! | nerfstudio | `transforms.json`, as above | `train_filenames`, ..., or `split` of each frame, or every eighth camera |
 //! | N3V | `poses_bounds.npy` with `camNN.mp4`, or frames in `camNN/` | the first camera is for the test |
-//! | COLMAP | `sparse/0` (binary or text) with `images/` | every eighth camera |
+//! | COLMAP | the largest of `sparse/0`, `sparse/1`, ... (binary or text) with `images/` | every eighth camera |
 //! | golden views | `golden*.json`, a list `views`: FoV cameras always | |
 //!
 //! `format` has the table of the formats of folders. All cameras are pinhole cameras: the distortion of a lens is undone when an image is loaded
@@ -30,12 +30,16 @@ mod error;
 mod files;
 mod format;
 mod frame;
+mod json;
 mod lens;
 mod masks;
 mod n3v;
+mod named_images;
 mod nerfstudio;
 mod npy;
 mod numbered;
+mod origin;
+mod placing;
 pub(crate) mod point_cloud;
 mod pose;
 mod resample;

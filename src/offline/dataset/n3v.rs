@@ -8,12 +8,13 @@
 use super::distortion::Distortion;
 use super::frame::{Frame, Mask, output_name};
 use super::lens::{OriginalLens, checked_size};
-use super::numbered::{entries, images, number, times};
-use super::pose::{pose, single_precision};
+use super::numbered::{entries, images, is_video, number, times};
+use super::placing::{Placed, Unplaced, place};
+use super::pose::pose;
 use super::undivided::Undivided;
 use super::video::Videos;
 use super::{CameraOptions, Clock, DatasetError, FrameProblem, Split, masks, npy, video};
-use glam::{DVec2, Mat4, UVec2};
+use glam::{DMat4, DVec2, UVec2};
 use std::collections::{BTreeSet, HashSet};
 use std::fs::File;
 use std::io::Read;
@@ -25,12 +26,10 @@ pub(super) const POSES: &str = "poses_bounds.npy";
 const COLUMNS: usize = 17;
 /// Most bytes of the file.
 const MAX_BYTES: u64 = 1 << 24;
-/// Extensions of videos.
-const VIDEOS: [&str; 5] = ["mp4", "mov", "mkv", "webm", "avi"];
 
 /// A row of the file.
 struct Row {
-    world_to_camera: Mat4,
+    world_to_camera: DMat4,
     size: UVec2,
     lens: OriginalLens,
 }
@@ -71,14 +70,14 @@ pub(super) fn read(folder: &Path, options: &CameraOptions, mut videos: Videos<'_
     }
     let decoded = frames.iter().flatten().filter(|frame| !is_video(frame));
     let first = decoded.filter_map(|frame| number(frame)).min().unwrap_or(0);
-    let (mut names, mut views, mut splits) = (HashSet::new(), Vec::new(), Vec::new());
+    let (mut names, mut unplaced, mut splits) = (HashSet::new(), Vec::new(), Vec::new());
     for (index, ((row, camera), frames)) in rows.iter().zip(&cameras).zip(&frames).enumerate() {
         let is_left = frames.iter().any(|frame| is_video(frame));
         let times = if is_left { vec![0.0] } else { times(frames, first) };
         for (frame, time) in frames.iter().zip(times) {
             let file = frame.file_name().and_then(|name| name.to_str()).unwrap_or_default();
             let label = format!("{camera}_{file}");
-            let name = output_name(&label, views.len(), &mut names)
+            let name = output_name(&label, unplaced.len(), &mut names)
                 .ok_or_else(|| failed(index)(FrameProblem::FileName(label.clone())))?;
             let mask = masks::beside(folder, &Path::new(camera).join(file)).map(|path| Mask { path, applied: false });
             let frame = Frame {
@@ -90,11 +89,12 @@ pub(super) fn read(folder: &Path, options: &CameraOptions, mut videos: Videos<'_
                 lens: row.lens,
                 distortion: Distortion::default(),
             };
-            views.push(frame.into_view(row.size, options, true, failed(index))?);
+            unplaced.push(Unplaced { frame, original: row.size, failed: failed(index) });
             splits.push(Some(if index == 0 { Split::Test } else { Split::Train }));
         }
     }
-    Ok(Undivided { source, views, splits: Some(splits), clock: Clock::NUMBERED, points: None })
+    let Placed { views, origin, notes } = place(unplaced, options, true)?;
+    Ok(Undivided { source, views, splits: Some(splits), clock: Clock::NUMBERED, points: None, notes, origin })
 }
 
 fn bytes(path: &Path) -> Result<Vec<u8>, DatasetError> {
@@ -118,7 +118,7 @@ fn row(values: &[f64; COLUMNS]) -> Result<Row, FrameProblem> {
     }
     let size = checked_size(width, height)?;
     let lens = OriginalLens::Intrinsics { focal: DVec2::splat(focal), center: size.as_dvec2() / 2.0 };
-    Ok(Row { world_to_camera: single_precision(pose(&rows)?.inverse())?, size, lens })
+    Ok(Row { world_to_camera: pose(&rows)?.inverse(), size, lens })
 }
 
 /// Returns the names of the cameras, sorted.
@@ -138,11 +138,6 @@ fn cameras(folder: &Path) -> Result<BTreeSet<String>, DatasetError> {
     };
     names.retain(is_camera);
     Ok(names)
-}
-
-fn is_video(path: &Path) -> bool {
-    let extension = path.extension().unwrap_or_default();
-    VIDEOS.iter().any(|known| extension.eq_ignore_ascii_case(known)) && path.is_file()
 }
 
 /// Returns the frames of a camera. A video that is not decoded is its only frame.

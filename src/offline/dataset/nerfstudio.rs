@@ -4,10 +4,13 @@
 //! `test_filenames`, `val_filenames`), or an entry `split` of each frame.
 
 use super::camera_file::{CameraFile, SINGLE};
+use super::files::{OnDisk, with_slashes};
+use super::placing::Placed;
 use super::undivided::Undivided;
 use super::{CameraOptions, DatasetError, Split};
 use crate::codec::text::is_obeyed;
 use serde_json::Value;
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::path::Path;
 
@@ -28,15 +31,15 @@ pub(super) fn is_there(folder: &Path) -> bool {
 pub(super) fn read(folder: &Path, options: &CameraOptions) -> Result<Undivided, DatasetError> {
     let source = folder.join(SINGLE);
     let file = CameraFile::read(&source)?;
-    let views = file.views(&CameraOptions { time_interval: None, ..*options })?;
-    let mut listed: HashMap<&str, Split> = HashMap::new();
+    let Placed { views, origin, notes } = file.views(&CameraOptions { time_interval: None, ..*options })?;
+    let mut listed: HashMap<Cow<'_, str>, Split> = HashMap::new();
     for (list, split) in LISTS {
         let names = file.entry(list).and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
         listed.extend(names.iter().filter_map(Value::as_str).map(|name| (plain(name), split)));
     }
     let split = |(path, split): (Option<&str>, Option<&str>)| {
         let of_frame = split.and_then(|split| NAMES.iter().find(|(name, _)| *name == split));
-        path.and_then(|path| listed.get(plain(path)).copied()).or(of_frame.map(|(_, split)| *split))
+        path.and_then(|path| listed.get(&*plain(path)).copied()).or(of_frame.map(|(_, split)| *split))
     };
     let splits: Vec<Option<Split>> = file.splits().map(split).collect();
     let splits = splits.iter().any(Option::is_some).then_some(splits);
@@ -45,11 +48,14 @@ pub(super) fn read(folder: &Path, options: &CameraOptions) -> Result<Undivided, 
         let reason = format!("{POINTS} has control characters: rename the file of points, and correct the entry");
         return Err(DatasetError::Unusable { path: source, reason });
     }
-    let points = points.map(|path| folder.join(path));
-    Ok(Undivided { source, views, splits, clock: file.clock(), points })
+    let points = points.map(|path| OnDisk::default().find(folder, &*with_slashes(path)));
+    Ok(Undivided { source, views, splits, clock: file.clock(), points, notes, origin })
 }
 
-/// Returns a path without `./` before it.
-fn plain(path: &str) -> &str {
-    path.strip_prefix("./").unwrap_or(path)
+/// Returns a path with slashes, without `./` before it.
+fn plain(path: &str) -> Cow<'_, str> {
+    match with_slashes(path) {
+        Cow::Borrowed(path) => Cow::Borrowed(path.strip_prefix("./").unwrap_or(path)),
+        Cow::Owned(path) => Cow::Owned(path.strip_prefix("./").map(str::to_owned).unwrap_or(path)),
+    }
 }

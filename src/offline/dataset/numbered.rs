@@ -3,6 +3,7 @@
 //! In: a folder. Out: its images in the order of their numbers, and the times of numbered frames, at 30 frames a second.
 
 use super::DatasetError;
+use crate::codec::hidden::is_hidden;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -26,8 +27,15 @@ pub(super) fn images(folder: &Path) -> Result<Vec<PathBuf>, DatasetError> {
     Ok(images)
 }
 
-/// Returns the paths in a folder, sorted; none if there is no such folder.
+/// Returns the paths in a folder, sorted, without hidden files and those of systems; none if there is no such folder.
 pub(super) fn entries(folder: &Path) -> Result<Vec<PathBuf>, DatasetError> {
+    let mut paths = all_entries(folder)?;
+    paths.retain(|path| !path.file_name().is_some_and(is_hidden));
+    Ok(paths)
+}
+
+/// Returns all paths in a folder, sorted; none if there is no such folder.
+pub(super) fn all_entries(folder: &Path) -> Result<Vec<PathBuf>, DatasetError> {
     if !folder.is_dir() {
         return Ok(Vec::new());
     }
@@ -46,11 +54,20 @@ pub(super) fn number(path: &Path) -> Option<u64> {
 }
 
 /// Returns the time of each frame, seconds: its number minus `first`, or its place in the list if a frame has no number.
-pub(super) fn times(frames: &[PathBuf], first: u64) -> Vec<f32> {
+pub(super) fn times(frames: &[PathBuf], first: u64) -> Vec<f64> {
     let offset = |frame: &PathBuf| number(frame).map(|number| number.saturating_sub(first));
     let offsets: Option<Vec<u64>> = frames.iter().map(offset).collect();
     let offsets = offsets.unwrap_or_else(|| (0..frames.len() as u64).collect());
-    offsets.into_iter().map(|offset| (offset as f64 / FRAME_RATE) as f32).collect()
+    offsets.into_iter().map(|offset| offset as f64 / FRAME_RATE).collect()
+}
+
+/// Extensions of videos.
+const VIDEOS: [&str; 5] = ["mp4", "mov", "mkv", "webm", "avi"];
+
+/// Returns whether a path is that of a video.
+pub(super) fn is_video(path: &Path) -> bool {
+    let extension = path.extension().unwrap_or_default();
+    VIDEOS.iter().any(|known| extension.eq_ignore_ascii_case(known)) && path.is_file()
 }
 
 #[cfg(test)]
@@ -60,12 +77,12 @@ mod tests {
     #[test]
     fn frames_are_sorted_by_their_numbers() {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        for name in ["f10.png", "f9.png", "f2.JPG", "notes.txt"] {
+        for name in ["f10.png", "f9.png", "f2.JPG", "notes.txt", "._f9.png", ".f3.png"] {
             fs::write(folder.path().join(name), b"").expect("the folder can be written to");
         }
         let found = images(folder.path()).expect("the folder can be read");
         let names: Vec<_> = found.iter().filter_map(|path| path.file_name()?.to_str()).collect();
-        assert_eq!(names, ["f2.JPG", "f9.png", "f10.png"], "by number, images alone");
+        assert_eq!(names, ["f2.JPG", "f9.png", "f10.png"], "by number, images alone, none that is hidden");
         assert_eq!(times(&found, 2), [0.0, 7.0 / 30.0, 8.0 / 30.0], "the first number is time 0");
         let unnumbered = [PathBuf::from("a.png"), PathBuf::from("b.png")];
         for first in [0, 7, u64::MAX] {

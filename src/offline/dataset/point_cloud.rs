@@ -1,13 +1,16 @@
 //! Points to begin a training with.
 //!
-//! In: a file of points: PLY (`x`, `y`, `z`, optionally `red`, `green`, `blue` and `time`), or COLMAP's `points3D.bin` and `points3D.txt`. Out: a
-//! [`PointCloud`]. Points whose place or time is not finite are left out. No count of a file is trusted before as many bytes are there.
+//! In: a file of points: PLY (`x`, `y`, `z`, optionally `red`, `green`, `blue` and `time`), or COLMAP's `points3D.bin` and `points3D.txt`; the origin
+//! of the views. Out: a [`PointCloud`]. Points whose place or time is not finite are left out. No count of a file is trusted before as many bytes are
+//! there.
 
 pub use super::cloud_point::CloudPoint;
 
 use super::DatasetError;
 use super::colmap;
-use crate::codec::import::ply::{is_ply, vertices};
+use crate::codec::import::ply::is_ply;
+use crate::codec::import::ply::read::vertices;
+use crate::scene::Origin;
 use glam::Vec3;
 use std::fs;
 use std::path::Path;
@@ -20,16 +23,16 @@ pub(super) const BESIDE: &str = "points3d.ply";
 pub struct PointCloud(pub Vec<CloudPoint>);
 
 impl PointCloud {
-    /// Reads a file.
+    /// Reads a file, whose places and times are counted from an origin in its coordinates.
     ///
     /// # Errors
     /// A file that cannot be read, that is damaged or of another kind.
-    pub fn load(path: &Path) -> Result<Self, DatasetError> {
+    pub fn load(path: &Path, origin: &Origin) -> Result<Self, DatasetError> {
         let has = |ending: &str| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(ending));
         let mut points = match (has("bin"), has("txt")) {
-            (true, _) => colmap::binary_points(path)?,
-            (_, true) => colmap::text_points(path)?,
-            _ => ply(path)?,
+            (true, _) => colmap::binary_points(path, origin)?,
+            (_, true) => colmap::text_points(path, origin)?,
+            _ => ply(path, origin)?,
         };
         points.retain(|point| point.position.is_finite() && point.time.is_none_or(f32::is_finite));
         Ok(Self(points))
@@ -37,7 +40,7 @@ impl PointCloud {
 }
 
 /// Reads a PLY file.
-fn ply(path: &Path) -> Result<Vec<CloudPoint>, DatasetError> {
+fn ply(path: &Path, origin: &Origin) -> Result<Vec<CloudPoint>, DatasetError> {
     let bytes = fs::read(path).map_err(|reason| DatasetError::Read { path: path.to_owned(), reason })?;
     if !is_ply(&bytes) {
         return Err(unusable(path, "it is no file of points: PLY and COLMAP's points3D.bin and points3D.txt are read"));
@@ -47,10 +50,10 @@ fn ply(path: &Path) -> Result<Vec<CloudPoint>, DatasetError> {
     let places = table.all(["x", "y", "z"]).map_err(faulty)?;
     let colors = table.all(["red", "green", "blue"]).ok();
     let time = table.column("time");
-    let point = |index: usize| CloudPoint {
-        position: Vec3::from(places.map(|column| column.f32(index))),
-        color: colors.map(|columns| color(columns.map(|column| column.share(index)))),
-        time: time.map(|column| column.f32(index)),
+    let point = |index: usize| {
+        let color = colors.map(|columns| color(columns.map(|column| column.share(index))));
+        let time = time.map(|column| column.f64(index));
+        CloudPoint::counted_from(origin, places.map(|column| column.f64(index)), color, time)
     };
     Ok((0..table.len()).map(point).collect())
 }

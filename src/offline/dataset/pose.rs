@@ -1,41 +1,108 @@
 //! Poses of cameras.
 //!
-//! In: matrices, or quaternions with translations, of a file. Out: world-to-camera matrices in single precision, or the fault.
+//! In: matrices, or quaternions with translations, of a file. Out: world-to-camera matrices in double precision, those that are counted from an origin in
+//! single precision, or the fault.
 
 use super::FrameProblem;
+use crate::codec::text::printable;
 use glam::{DMat3, DMat4, DQuat, DVec3, DVec4, Mat4};
+use serde_json::Value;
+use std::slice;
 
 /// A determinant below this fraction of the product of the lengths of its columns counts as zero.
 const SINGULAR: f64 = 1e-9;
+/// Largest error of a rotation and of a scale: that of numbers rounded to three decimals.
+pub(super) const ROUNDED: f64 = 2e-3;
 
-/// Returns the matrix with these rows, which must be finite, affine and invertible.
+const FORM: &str =
+    "must be four rows of four numbers, or the first three of them, or these numbers in one list, row by row";
+const MIRRORED: &str = "mirrors the picture (its determinant is negative): negate one axis of the cameras, or write the file without mirroring the scene";
+const SHEARED: &str =
+    "is sheared, or stretched along an axis: it must be a rotation, possibly times one factor, and a translation";
+
+fn fault(reason: &'static str) -> FrameProblem {
+    FrameProblem::Matrix(reason.into())
+}
+
+/// Returns the rows of a matrix in a file: four rows, of which the last may be left out, or all their numbers in one list, row by row.
+pub(super) fn rows(value: &Value) -> Result<[[f64; 4]; 4], FrameProblem> {
+    let list = value.as_array().map_or(&[][..], Vec::as_slice);
+    let entries = || list.iter().flat_map(|row| row.as_array().map_or(slice::from_ref(row), Vec::as_slice));
+    if let Some(entry) = entries().find(|entry| !entry.is_number()) {
+        let reason = format!("holds {}, which is no number", printable(&entry.to_string()));
+        return Err(FrameProblem::Matrix(reason.into()));
+    }
+    let are_rows = list.iter().all(|row| row.as_array().is_some_and(|row| row.len() == 4));
+    let numbers: Vec<f64> = entries().filter_map(Value::as_f64).collect();
+    if !(matches!(numbers.len(), 12 | 16) && (are_rows || list.len() == numbers.len())) {
+        return Err(fault(FORM));
+    }
+    let mut rows = DMat4::IDENTITY.to_cols_array_2d();
+    for (row, numbers) in rows.iter_mut().zip(numbers.chunks_exact(4)) {
+        row.copy_from_slice(numbers);
+    }
+    Ok(rows)
+}
+
+/// Returns the matrix with these rows, which must be finite and affine, and turn, move and scale alone.
 pub(super) fn pose(rows: &[[f64; 4]; 4]) -> Result<DMat4, FrameProblem> {
     let matrix = DMat4::from_cols_array_2d(rows).transpose();
     if !matrix.is_finite() {
-        return Err(FrameProblem::Matrix("holds a value that is not finite"));
+        return Err(fault("holds a value that is not finite"));
     }
     if !matrix.row(3).abs_diff_eq(DVec4::W, 1e-6) {
-        return Err(FrameProblem::Matrix("must end in the row 0 0 0 1"));
+        return Err(fault("must end in the row 0 0 0 1"));
     }
-    if is_invertible(matrix) { Ok(matrix) } else { Err(FrameProblem::Matrix("cannot be inverted")) }
+    if !is_invertible(matrix) {
+        return Err(fault("cannot be inverted"));
+    }
+    let linear = DMat3::from_mat4(matrix);
+    if linear.determinant() < 0.0 {
+        return Err(fault(MIRRORED));
+    }
+    let turn = linear * (1.0 / scale(&matrix));
+    let is_turn = (turn.transpose() * turn).abs_diff_eq(DMat3::IDENTITY, ROUNDED);
+    if is_turn { Ok(matrix) } else { Err(fault(SHEARED)) }
 }
 
 /// Returns the world-to-camera matrix of a rotation (w, x, y, z; of any length but 0) and a translation.
-pub(super) fn of_rotation([w, x, y, z]: [f64; 4], translation: [f64; 3]) -> Result<Mat4, FrameProblem> {
+pub(super) fn of_rotation([w, x, y, z]: [f64; 4], translation: [f64; 3]) -> Result<DMat4, FrameProblem> {
     let quaternion = DQuat::from_xyzw(x, y, z, w);
     let length = quaternion.length();
     if !(length.is_finite() && length > f64::MIN_POSITIVE) {
-        return Err(FrameProblem::Matrix("has a rotation of length 0, or one that is not finite"));
+        return Err(fault("has a rotation of length 0, or one that is not finite"));
     }
     let quaternion = DQuat::from_vec4(DVec4::from(quaternion) / length);
-    single_precision(DMat4::from_rotation_translation(quaternion.normalize(), DVec3::from(translation)))
+    let matrix = DMat4::from_rotation_translation(quaternion.normalize(), DVec3::from(translation));
+    if matrix.is_finite() { Ok(matrix) } else { Err(fault("holds a value that is not finite")) }
+}
+
+/// Returns the factor by which a matrix scales.
+pub(super) fn scale(matrix: &DMat4) -> f64 {
+    DMat3::from_mat4(*matrix).determinant().abs().cbrt()
+}
+
+/// Returns a world-to-camera matrix without its scale. The camera stays at its place.
+pub(super) fn unscaled(world_to_camera: DMat4, scale: f64) -> DMat4 {
+    DMat4::from_scale(DVec3::splat(1.0 / scale)) * world_to_camera
+}
+
+/// Returns the place of a camera in the world.
+pub(super) fn center(world_to_camera: &DMat4) -> DVec3 {
+    world_to_camera.inverse().w_axis.truncate()
+}
+
+/// Returns the world-to-camera matrix for a world whose places are counted from an origin.
+pub(super) fn counted_from(origin: DVec3, world_to_camera: DMat4) -> DMat4 {
+    // Without an origin every bit stays as it is, also that of minus 0.
+    if origin == DVec3::ZERO { world_to_camera } else { world_to_camera * DMat4::from_translation(origin) }
 }
 
 /// Narrows a matrix, which must stay finite and invertible.
 pub(super) fn single_precision(matrix: DMat4) -> Result<Mat4, FrameProblem> {
     let narrow = matrix.as_mat4();
     let usable = narrow.is_finite() && is_invertible(narrow.as_dmat4());
-    if usable { Ok(narrow) } else { Err(FrameProblem::Matrix("is too large or too small for float32")) }
+    if usable { Ok(narrow) } else { Err(fault("is too large or too small for float32")) }
 }
 
 /// Returns whether the linear part is invertible; false if its determinant overflows.
@@ -48,12 +115,19 @@ fn is_invertible(matrix: DMat4) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use serde_json::json;
+
+    const IDENTITY: [[f64; 4]; 4] =
+        [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
+
+    fn refusal(rows: &[[f64; 4]; 4]) -> String {
+        pose(rows).expect_err("the matrix is refused").to_string()
+    }
 
     #[test]
     fn poses_must_be_finite_affine_and_invertible() {
-        let identity = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
         let with = |row: usize, column: usize, value: f64| {
-            let mut rows = identity;
+            let mut rows = IDENTITY;
             rows[row][column] = value;
             pose(&rows).is_ok()
         };
@@ -69,10 +143,73 @@ mod tests {
     }
 
     #[test]
+    fn poses_must_be_turns_of_one_scale() {
+        let turned = DMat4::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), 1.1);
+        let rows = |matrix: DMat4| matrix.transpose().to_cols_array_2d();
+        let narrow = turned.as_mat4().as_dmat4();
+        let rounded = DMat4::from_cols_array(&turned.to_cols_array().map(|value| (value * 1000.0).round() / 1000.0));
+        for accepted in [turned, narrow, rounded, turned * DMat4::from_scale(DVec3::splat(40.0))] {
+            assert_eq!(pose(&rows(accepted)).expect("a turn of one scale"), accepted, "the matrix stays as it is");
+        }
+        for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
+            let mirrored = refusal(&rows(turned * DMat4::from_scale(DVec3::ONE - 2.0 * axis)));
+            assert!(mirrored.contains("mirrors"), "a reflection is refused: {mirrored}");
+            let stretched = refusal(&rows(turned * DMat4::from_scale(DVec3::ONE + 0.01 * axis)));
+            assert!(stretched.contains("stretched"), "a scale along one axis is refused: {stretched}");
+        }
+        let mut sheared = IDENTITY;
+        sheared[0][1] = 0.01;
+        assert!(refusal(&sheared).contains("sheared"), "a shear is refused");
+    }
+
+    #[test]
+    fn matrices_have_twelve_or_sixteen_numbers() {
+        let whole = json!([[1, 0, 0, 5], [0, 1, 0, 6], [0, 0, 1, 7], [0, 0, 0, 1]]);
+        let flat = json!([1, 0, 0, 5, 0, 1, 0, 6, 0, 0, 1, 7, 0, 0, 0, 1]);
+        let expected = rows(&whole).expect("four rows");
+        assert_eq!(expected[1], [0.0, 1.0, 0.0, 6.0], "the second row");
+        let first = |value: &Value, count: usize| Value::from(value.as_array().expect("a list")[..count].to_vec());
+        for value in [first(&whole, 3), flat.clone(), first(&flat, 12)] {
+            assert_eq!(rows(&value).expect("the same rows"), expected, "{value}");
+        }
+        for (value, part) in [
+            (Value::Null, "four rows"),
+            (json!([]), "four rows"),
+            (json!({"a": 1}), "four rows"),
+            (first(&whole, 2), "four rows"),
+            (first(&flat, 9), "four rows"),
+            (json!([[1, 0, 0], [0, 1, 0], [0, 0, 1], [5, 6, 7]]), "four rows"),
+            (json!([[1, 0, 0, 5], 0, 1, 0, 6, 0, 0, 1, 7]), "four rows"),
+            (json!([[1, 0, 0, null]]), "null"),
+            (json!([[[1]]]), "[1], which is no number"),
+            (json!(["NaN in line 3"]), "NaN in line 3"),
+        ] {
+            let reason = rows(&value).expect_err("no matrix").to_string();
+            assert!(reason.contains(part), "{value}: {part:?} is not in: {reason}");
+        }
+    }
+
+    #[test]
+    fn scales_are_undone_and_origins_subtracted() {
+        let place = DVec3::new(500_000.0, 5_400_000.0, 300.0);
+        let to_world = DMat4::from_rotation_translation(DQuat::from_rotation_y(0.7), place);
+        let scaled = (to_world * DMat4::from_scale(DVec3::splat(2.5))).inverse();
+        assert!((scale(&scaled) - 0.4).abs() < 1e-12, "the scale of the inverse matrix");
+        let found = unscaled(scaled, scale(&scaled));
+        assert!(found.abs_diff_eq(to_world.inverse(), 1e-6), "a turn: {found}");
+        assert!(center(&found).abs_diff_eq(place, 1e-6), "the place of the camera stays: {}", center(&found));
+        let moved = counted_from(place - DVec3::X, found);
+        assert!(center(&moved).abs_diff_eq(DVec3::X, 1e-6), "one unit from the origin: {}", center(&moved));
+        let minus = DMat4::from_translation(DVec3::new(-0.0, 1.0, 2.0));
+        let bits = |matrix: DMat4| matrix.to_cols_array().map(f64::to_bits);
+        assert_eq!(bits(counted_from(DVec3::ZERO, minus)), bits(minus), "no origin changes no bit");
+    }
+
+    #[test]
     fn rotations_are_normalized_and_may_not_be_zero() {
         let turned = of_rotation([2.0, 0.0, 0.0, 2.0], [1.0, 2.0, 3.0]).expect("a rotation of length 2.8");
-        let found = turned.transform_point3(glam::Vec3::X);
-        assert!(found.abs_diff_eq(glam::Vec3::new(1.0, 3.0, 3.0), 1e-6), "a quarter turn about z: {found}");
+        let found = turned.transform_point3(DVec3::X);
+        assert!(found.abs_diff_eq(DVec3::new(1.0, 3.0, 3.0), 1e-12), "a quarter turn about z: {found}");
         for rotation in [[0.0; 4], [f64::NAN, 0.0, 0.0, 1.0], [f64::INFINITY, 0.0, 0.0, 1.0]] {
             assert!(of_rotation(rotation, [0.0; 3]).is_err(), "{rotation:?} is refused");
         }

@@ -4,7 +4,7 @@
 //! number of their distinct times.
 
 use super::TrainingView;
-use crate::view::{Camera, Lens, RasterFov, View};
+use crate::view::{Camera, Lens, Optics, View};
 use std::collections::{HashMap, HashSet};
 
 /// The fraction of the golden ratio: the fractions of its multiples are evenly distributed between 0 and 1.
@@ -75,9 +75,10 @@ pub fn distinct_times(views: &[TrainingView]) -> usize {
     views.iter().map(|view| view.time.to_bits()).collect::<HashSet<_>>().len()
 }
 
-/// Returns the renderer's view for each training view.
-pub fn to_draw(views: &[TrainingView], raster_fov: RasterFov) -> Vec<View> {
-    views.iter().map(|view| view.camera.view(view.time, raster_fov)).collect()
+/// Returns the renderer's view for each training view of a capture with these optics.
+pub fn to_draw(views: &[TrainingView], optics: impl Into<Optics>) -> Vec<View> {
+    let optics = optics.into();
+    views.iter().map(|view| view.camera.view(view.time, optics)).collect()
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 //! In: a file. Out: its numbers, one after the other. No number of the file is used before as many bytes are known to be there.
 
 use super::DatasetError;
+use super::files::utf8_or_latin1;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
@@ -54,7 +55,7 @@ impl Stream {
         self.reader.seek_relative(offset).map_err(|reason| DatasetError::Read { path: self.path.clone(), reason })
     }
 
-    /// Reads a text that ends in 0, of at most `longest` bytes.
+    /// Reads a text that ends in 0, of at most `longest` bytes, in UTF-8 or Latin-1.
     pub(super) fn text(&mut self, longest: usize) -> Result<String, DatasetError> {
         let mut bytes = Vec::new();
         let limit = self.left.min(longest as u64 + 1);
@@ -62,9 +63,7 @@ impl Stream {
         let read = read.map_err(|reason| DatasetError::Read { path: self.path.clone(), reason })?;
         self.left -= read as u64;
         match bytes.pop() {
-            Some(0) => {
-                String::from_utf8(bytes).map_err(|_| self.unusable("a name in it is not UTF-8: rename the image"))
-            }
+            Some(0) => Ok(utf8_or_latin1(&bytes).into_owned()),
             _ => Err(self.unusable("a name in it does not end: copy the file again, or write it again with COLMAP")),
         }
     }

@@ -1,9 +1,10 @@
 //! What a dataset folder holds, for people and programs.
 //!
-//! In: a folder. Out: its format, its splits with cameras, times and sizes, and what is missing. No image and no video is decoded, except for the size
-//! of one image where the camera files have no size.
+//! In: a folder, how it is read. Out: its format, its splits with cameras, times and sizes, what is missing, and what was assumed. No image and no
+//! video is decoded, except for the size of one image where the camera files have no size.
 
 use super::dataset_split::not_a_dataset;
+use super::error::LOOKED_FOR;
 use super::selection::distinct_cameras;
 use super::{CameraOptions, Dataset, DatasetError, Split, TrainingView};
 use crate::view::Camera;
@@ -34,6 +35,8 @@ pub struct Summary {
     pub points: Option<PathBuf>,
     /// What is missing or unusual, a sentence each.
     pub missing: Vec<String>,
+    /// What was assumed or left out, a sentence each.
+    pub notes: Vec<String>,
 }
 
 /// One split.
@@ -53,12 +56,16 @@ impl Summary {
     ///
     /// # Errors
     /// The folder is no dataset, or neither its training nor its test split can be opened.
-    pub fn of(folder: &Path) -> Result<Self, DatasetError> {
+    pub fn of(folder: &Path, options: &CameraOptions) -> Result<Self, DatasetError> {
         let format = Dataset::format(folder).ok_or_else(|| not_a_dataset(folder, Split::Train))?;
         let (mut splits, mut views, mut missing, mut points) = (Vec::new(), Vec::new(), Vec::new(), None);
-        let mut failed = None;
+        let (mut failed, mut notes): (_, Vec<String>) = (None, Vec::new());
         for split in Split::ALL {
-            match Dataset::look(folder, split, &CameraOptions::default()) {
+            let found = Dataset::look(folder, split, options);
+            let said = found.iter().flat_map(|dataset| &dataset.notes);
+            let new: Vec<String> = said.filter(|note| !notes.contains(note)).cloned().collect();
+            notes.extend(new);
+            match found {
                 // The test split of a folder may be its validation split.
                 Ok(dataset) if dataset.split == split => {
                     splits.push(SplitSummary {
@@ -110,6 +117,7 @@ impl Summary {
             masks: views.iter().filter(|view| view.mask.is_some()).count(),
             points,
             missing,
+            notes,
         })
     }
 }
@@ -146,7 +154,7 @@ fn absent(views: &[TrainingView]) -> Vec<String> {
     };
     let gone: Vec<&Path> = files.iter().copied().filter(|path| !path.is_file()).collect();
     let videos: Vec<&Path> = files.iter().copied().filter(|path| is_video(path) && path.is_file()).collect();
-    let gone = listed(&gone, "images or masks are not on disk");
+    let gone = listed(&gone, "images or masks are not on disk").map(|sentence| format!("{sentence} ({LOOKED_FOR})"));
     let videos = listed(&videos, "videos have not been decoded, which needs ffmpeg; each counts as one view here");
     [gone, videos].into_iter().flatten().collect()
 }

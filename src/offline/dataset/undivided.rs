@@ -3,6 +3,7 @@
 //! In: what the reader of a format finds. Out: views of all splits, before they are divided.
 
 use super::{Clock, Split, TrainingView};
+use crate::scene::Origin;
 use std::path::PathBuf;
 
 /// The views of a folder before they are divided.
@@ -16,4 +17,8 @@ pub(super) struct Undivided {
     pub clock: Clock,
     /// File of points to begin training with.
     pub points: Option<PathBuf>,
+    /// What was assumed or left out, a sentence each.
+    pub notes: Vec<String>,
+    /// The origin of the views in the coordinates of the files.
+    pub origin: Origin,
 }

@@ -2,16 +2,17 @@
 //!
 //! In: a dataset, a video in it. Out: its frames as PNG in `DATASET.frames/CAMERA/`, beside the dataset. The folder appears whole: frames are written
 //! to a temporary folder, which is then renamed. Frames that are there are used and never overwritten. One process at a time decodes; the folders that
-//! killed processes have left are removed.
+//! killed processes have left are removed, and so is the file that is locked.
 
 use super::DatasetError;
-use super::numbered::{entries, images};
+use super::numbered::{all_entries, entries, images, is_video};
 use crate::codec::text::printable;
 use crate::offline::Progress;
+use crate::offline::node::node;
 use ffmpeg_sidecar::command::FfmpegCommand;
 use std::ffi::OsStr;
 use std::fs::{self, File};
-use std::io::{ErrorKind, Read};
+use std::io::{self, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 /// What is done with videos whose frames have not been decoded.
@@ -24,6 +25,8 @@ pub(super) enum Videos<'a> {
 
 /// The program.
 const PROGRAM: &str = "ffmpeg";
+/// What the name of the folder of decoded frames has after that of the dataset.
+const FRAMES: &str = ".frames";
 /// Prefix of the names of temporary folders.
 const PREFIX: &str = ".gs4d-";
 /// File that is locked while a process decodes, so that all temporary folders are those of killed processes.
@@ -52,12 +55,62 @@ pub(super) fn decoded(folder: &Path, camera: &str) -> Result<Option<Vec<PathBuf>
     Ok((!found.is_empty()).then_some(found))
 }
 
+/// Returns the folder of all decoded frames if a path is that of a frame in it: beside the folder of a dataset with the video of that camera.
+pub(super) fn decoded_into(frame: &Path) -> Option<&Path> {
+    let camera = frame.parent()?;
+    let cache = camera.parent()?;
+    let dataset = cache.with_file_name(cache.file_name()?.to_str()?.strip_suffix(FRAMES)?);
+    let is_video = |path: &PathBuf| path.file_stem() == camera.file_name() && is_video(path);
+    entries(&dataset).ok()?.iter().any(is_video).then_some(cache)
+}
+
 /// Returns the folder of all decoded frames: `DATASET.frames`.
 fn cache(folder: &Path) -> Result<PathBuf, DatasetError> {
     let failed = |reason| DatasetError::Read { path: folder.to_owned(), reason };
     let mut path = folder.canonicalize().map_err(failed)?.into_os_string();
-    path.push(".frames");
+    path.push(FRAMES);
     Ok(path.into())
+}
+
+/// The file that is locked while a process decodes. It is removed at the end, by the process that holds it.
+struct Lock {
+    file: File,
+    path: PathBuf,
+    /// Whether no other process decodes: false where files cannot be locked.
+    is_held: bool,
+}
+
+impl Lock {
+    /// Waits until no other process decodes.
+    fn of(cache: &Path) -> io::Result<Self> {
+        let path = cache.join(LOCK);
+        loop {
+            let file = File::create(&path)?;
+            let is_held = file.lock().is_ok();
+            let lock = Self { file, path: path.clone(), is_held };
+            // The process before may have removed the file that this one waited for; another may have made a new one.
+            if !is_held || lock.is_at_its_path() {
+                return Ok(lock);
+            }
+        }
+    }
+
+    /// Returns whether the file is the one at the path, as far as the system tells.
+    fn is_at_its_path(&self) -> bool {
+        let [own, there] =
+            [self.file.metadata(), self.path.metadata()].map(|metadata| metadata.ok().as_ref().map(node));
+        own == there
+    }
+}
+
+impl Drop for Lock {
+    fn drop(&mut self) {
+        // Where files have no numbers, a process that waits for this file could not tell that it is removed.
+        let has_number = self.file.metadata().ok().as_ref().and_then(node).is_some();
+        if !self.is_held || has_number && self.is_at_its_path() {
+            let _ = fs::remove_file(&self.path);
+        }
+    }
 }
 
 fn decode(
@@ -69,19 +122,19 @@ fn decode(
     progress: &mut dyn Progress,
 ) -> Result<Vec<PathBuf>, DatasetError> {
     let unusable = |reason: String| DatasetError::Unusable { path: video.to_owned(), reason };
-    let unwritable = |error: std::io::Error| {
+    let unwritable = |error: io::Error| {
         let reason =
             format!("its frames cannot be written to {}: {error}; {}", cache.display(), by_hand(folder, video, camera));
         unusable(reason)
     };
     fs::create_dir_all(cache).map_err(unwritable)?;
-    let lock = File::create(cache.join(LOCK)).map_err(unwritable)?;
+    let lock = Lock::of(cache).map_err(unwritable)?;
     // Where files cannot be locked, no temporary folder is known to be stale.
-    if lock.lock().is_ok() {
+    if lock.is_held {
         let is_temporary = |path: &PathBuf| {
             path.file_name().is_some_and(|name| name.as_encoded_bytes().starts_with(PREFIX.as_bytes()))
         };
-        for path in entries(cache)?.into_iter().filter(is_temporary) {
+        for path in all_entries(cache)?.into_iter().filter(is_temporary) {
             // A program whose parent was killed may still write to it.
             let _ = fs::remove_dir_all(path);
         }
@@ -136,6 +189,11 @@ fn decode(
         return Err(unusable("ffmpeg was ended by a signal: run the command again".to_owned()));
     }
     if !status.success() || found.is_empty() {
+        let said = match (said.is_empty(), status.success()) {
+            (false, _) => said,
+            (true, true) => "it finds no picture in it".to_owned(),
+            (true, false) => format!("it ends without a word, {status}"),
+        };
         return Err(unusable(format!(
             "ffmpeg cannot read it ({said}): copy it again, or {}",
             by_hand(folder, video, camera)
@@ -189,11 +247,10 @@ mod tests {
         decode(program.as_os_str(), &data.join("cam00.mp4"), &cache, "cam00", &data, &mut NoProgress)
     }
 
-    /// Returns the names in the folder of frames, without the lock.
+    /// Returns all names in the folder of frames.
     fn names(folder: &Path) -> Vec<String> {
-        let paths = entries(&folder.join("data.frames")).expect("the folder can be read");
-        let names = paths.iter().filter_map(|path| path.file_name()?.to_str());
-        names.filter(|name| *name != LOCK).map(str::to_owned).collect()
+        let paths = all_entries(&folder.join("data.frames")).expect("the folder can be read");
+        paths.iter().filter_map(|path| path.file_name()?.to_str()).map(str::to_owned).collect()
     }
 
     /// Writes two frames with the names of the last argument.
@@ -213,7 +270,7 @@ mod tests {
         assert_eq!(
             names(&folder),
             ["cam00"],
-            "no temporary folder is left, neither an own one nor that of a killed run"
+            "neither a temporary folder is left, of this run or a killed one, nor the file that was locked"
         );
         let mode = |path: &Path| fs::metadata(path).expect("the folder exists").permissions().mode();
         assert_eq!(
@@ -277,5 +334,26 @@ mod tests {
         let error = decoded_by(&program(folder.path(), script), folder.path()).expect_err("it fails").to_string();
         assert!(error.contains("(broken; twice)"), "the lines of the program are shown: {error}");
         assert_eq!(names(folder.path()), [""; 0], "the frames of a run that fails are removed");
+    }
+
+    #[test]
+    fn a_program_that_says_nothing_has_a_reason() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        for (script, reason) in [("exit 3", "ends without a word, exit status: 3"), ("exit 0", "finds no picture")] {
+            let error = decoded_by(&program(folder.path(), script), folder.path()).expect_err(script).to_string();
+            assert!(error.contains(reason), "{script}, {reason}: {error}");
+        }
+    }
+
+    #[test]
+    fn decoded_frames_are_those_beside_a_dataset_with_their_video() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let cache = folder.path().join("data.frames");
+        fs::create_dir(folder.path().join("data")).expect("the folder can be made");
+        assert_eq!(decoded_into(&cache.join("cam00/00000.png")), None, "a folder of somebody else");
+        fs::write(folder.path().join("data/cam00.mp4"), b"").expect("the folder can be written to");
+        assert_eq!(decoded_into(&cache.join("cam00/00000.png")), Some(&*cache), "a frame of the video");
+        assert_eq!(decoded_into(&cache.join("cam01/00000.png")), None, "no video of this camera");
+        assert_eq!(decoded_into(&folder.path().join("data/cam00/00000.png")), None, "a frame of the dataset");
     }
 }

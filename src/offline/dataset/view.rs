@@ -11,7 +11,7 @@ use image::{DynamicImage, GrayImage, RgbaImage};
 
 use super::distortion::Undistortion;
 use super::files::require_files;
-use super::{DatasetError, MAX_SIDE, resample};
+use super::{DatasetError, MAX_SIDE, resample, video};
 use crate::offline::picture_file;
 use crate::view::{Camera, Picture};
 
@@ -76,8 +76,8 @@ impl TrainingView {
     ///
     /// # Errors
     /// [`DatasetError::MissingImages`] if the image or the mask is not on disk, [`DatasetError::Image`] if one cannot
-    /// be decoded, is truncated or is far larger than [`original`](Self::original), [`DatasetError::Size`] if the size of
-    /// the camera is out of range.
+    /// be decoded, is truncated or is far larger than [`original`](Self::original), or [`DatasetError::Decoded`] if it is
+    /// a frame that was decoded from a video, [`DatasetError::Size`] if the size of the camera is out of range.
     pub fn load_covered(&self) -> Result<CoveredImage, DatasetError> {
         let size = self.camera.size;
         if size.min_element() == 0 || size.max_element() > MAX_SIDE {
@@ -119,7 +119,10 @@ impl TrainingView {
     /// Decodes the image or the mask.
     fn decode(&self, path: &Path) -> Result<DynamicImage, DatasetError> {
         let largest = self.original.saturating_mul(UVec2::splat(LARGER)).min(UVec2::splat(MAX_SIDE));
-        let image = picture_file::open(path, largest)?;
+        let image = picture_file::open(path, largest).map_err(|reason| match video::decoded_into(path) {
+            Some(folder) => DatasetError::Decoded { reason: Box::new(reason), folder: folder.to_owned() },
+            None => reason.into(),
+        })?;
         let (size, expected) = (UVec2::new(image.width(), image.height()), self.original);
         if has_aspect_of(size, expected) {
             Ok(image)

@@ -6,6 +6,7 @@
 use super::{Folder, with};
 use bevy_gs4d::internal::offline::dataset::point_cloud::{CloudPoint, PointCloud};
 use bevy_gs4d::offline::dataset::{CameraOptions, Dataset, Split, TrainingView};
+use bevy_gs4d::scene::Origin;
 use bevy_gs4d::view::Lens;
 use glam::{UVec2, Vec3};
 use image::{GrayImage, Luma, Rgb, RgbImage, Rgba, RgbaImage};
@@ -83,26 +84,26 @@ fn assert_pixel(view: &TrainingView, expected: [f64; 2]) {
     assert!(off < 1e-3, "{}: the point is at {expected:?}, not {found:?}", view.name);
 }
 
-fn open(folder: &Folder, split: Split) -> Dataset {
+pub(super) fn open(folder: &Folder, split: Split) -> Dataset {
     Dataset::open(folder.path(), split, &CameraOptions::default()).expect("a valid dataset")
 }
 
-fn refused(folder: &Folder, part: &str) {
+pub(super) fn refused(folder: &Folder, part: &str) {
     let error = Dataset::open(folder.path(), Split::Train, &CameraOptions::default()).expect_err(part).to_string();
     assert!(error.contains(part), "{part:?} is not in: {error}");
 }
 
-fn names(views: &[TrainingView]) -> Vec<&str> {
+pub(super) fn names(views: &[TrainingView]) -> Vec<&str> {
     views.iter().map(|view| view.name.as_str()).collect()
 }
 
-fn picture(folder: &Folder, name: &str, color: [u8; 3]) {
+pub(super) fn picture(folder: &Folder, name: &str, color: [u8; 3]) {
     let path = folder.path().join(name);
     std::fs::create_dir_all(path.parent().expect("a folder")).expect("the folder can be made");
     RgbImage::from_pixel(WIDTH, HEIGHT, Rgb(color)).save(path).expect("an image");
 }
 
-fn nerfstudio(cameras: usize) -> Value {
+pub(super) fn nerfstudio(cameras: usize) -> Value {
     let frame = |index| json!({ "file_path": format!("images/f{index:02}.png"), "transform_matrix": Rig::new(index).to_world() });
     json!({
         "camera_model": "OPENCV", "w": WIDTH, "h": HEIGHT, "fl_x": FOCAL[0], "fl_y": FOCAL[1], "cx": CENTER[0], "cy": CENTER[1],
@@ -115,8 +116,10 @@ fn nerfstudio_projects_points_as_its_cameras_do() {
     let folder = Folder::new();
     let mut json = nerfstudio(10);
     json["frames"][9]["fl_x"] = json!(80.0);
-    json["frames"][9]["time"] = json!(0.25);
-    json["frames"][1]["frame_number"] = json!(15);
+    for index in 0..10 {
+        json["frames"][index]["time"] = json!(if index == 9 { 0.25 } else { 0.5 });
+        json["frames"][index]["frame_number"] = json!(index);
+    }
     folder.write_json("transforms.json", &json);
     let (train, test) = (open(&folder, Split::Train), open(&folder, Split::Test));
     assert_eq!(names(&test.views), ["f00", "f08"], "every eighth camera is for the test");
@@ -125,7 +128,7 @@ fn nerfstudio_projects_points_as_its_cameras_do() {
         assert_pixel(view, Rig::new(index).pixel(FOCAL, CENTER));
     }
     assert_pixel(&train.views[7], Rig::new(9).pixel([80.0, FOCAL[1]], CENTER));
-    assert_eq!((train.views[7].time, train.views[0].time), (0.25, 0.5), "the time, and the number of the frame");
+    assert_eq!((train.views[7].time, train.views[0].time), (0.25, 0.5), "the times, not the numbers of the frames");
     assert_eq!(train.points, Some(folder.path().join("points.ply")), "the file of points");
     refused_split(&folder);
 }
@@ -245,7 +248,7 @@ fn distortion_is_undone_when_an_image_is_loaded() {
 }
 
 /// Writes a COLMAP model as text. Each image has its name, its camera in the rig, and the number of its lens.
-fn colmap_text(folder: &Folder, model: &str, images: &[(&str, usize)]) {
+pub(super) fn colmap_text(folder: &Folder, model: &str, images: &[(&str, usize)]) {
     folder.write("sparse/0/cameras.txt", format!("# cameras\n7 {model}\n"));
     let mut text = "# images\n".to_owned();
     for (index, (name, camera)) in images.iter().enumerate() {
@@ -255,10 +258,10 @@ fn colmap_text(folder: &Folder, model: &str, images: &[(&str, usize)]) {
     folder.write("sparse/0/images.txt", text);
 }
 
-const PINHOLE: &str = "PINHOLE 40 30 50 52 19 16";
+pub(super) const PINHOLE: &str = "PINHOLE 40 30 50 52 19 16";
 
 /// Writes the same as binary files.
-fn colmap_binary(folder: &Folder, images: &[(&str, usize)]) {
+pub(super) fn colmap_binary(folder: &Folder, images: &[(&str, usize)]) {
     let mut cameras = 1u64.to_le_bytes().to_vec();
     cameras.extend(7u32.to_le_bytes());
     cameras.extend(1i32.to_le_bytes());
@@ -332,7 +335,7 @@ fn files_of_points_have_places_colors_and_times() {
     ];
     for (name, bytes, time) in files {
         folder.write(name, bytes);
-        let PointCloud(points) = PointCloud::load(&folder.path().join(name)).expect(name);
+        let PointCloud(points) = PointCloud::load(&folder.path().join(name), &Origin::default()).expect(name);
         let expected = CloudPoint { position: Vec3::new(2.0, -1.5, 0.25), color: Some(Vec3::new(0.2, 0.4, 1.0)), time };
         assert_eq!(points, [expected], "{name}: one finite point");
     }
@@ -351,7 +354,7 @@ fn files_of_points_have_places_colors_and_times() {
     ];
     for (name, bytes, reason) in refused {
         folder.write(name, bytes);
-        let error = PointCloud::load(&folder.path().join(name)).expect_err(name).to_string();
+        let error = PointCloud::load(&folder.path().join(name), &Origin::default()).expect_err(name).to_string();
         assert!(error.contains(name) && error.contains(reason), "{name}, {reason}: {error}");
     }
 }
@@ -419,7 +422,7 @@ fn colmap_models_that_cannot_be_used_are_refused_by_name() {
 }
 
 /// Writes `poses_bounds.npy` with a row for each camera of the rig.
-fn n3v(folder: &Folder, cameras: usize) {
+pub(super) fn n3v(folder: &Folder, cameras: usize) {
     let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({cameras}, 17), }}\n");
     let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
     bytes.extend((header.len() as u16).to_le_bytes());
@@ -475,7 +478,9 @@ fn cameras_at_one_place_are_refused() {
     }
     folder.write_json("transforms.json", &json);
     refused(&folder, "all 3 views are taken from the same place");
-    json["frames"][1]["time"] = json!(0.5);
+    for index in 0..3 {
+        json["frames"][index]["time"] = json!(if index == 1 { 0.5 } else { 0.0 });
+    }
     folder.write_json("transforms.json", &json);
     assert_eq!(open(&folder, Split::Train).views.len(), 2, "a camera that stands still may have several times");
     folder.write_json("transforms.json", &nerfstudio(1));

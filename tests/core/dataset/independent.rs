@@ -8,6 +8,7 @@
 
 use bevy_gs4d::internal::offline::dataset::point_cloud::{CloudPoint, PointCloud};
 use bevy_gs4d::offline::dataset::{CameraOptions, CoveredImage, Dataset, Split, TrainingView};
+use bevy_gs4d::scene::Origin;
 use bevy_gs4d::view::Lens;
 use glam::{DVec2, UVec2, Vec2, Vec3, Vec3Swizzles};
 use serde::Deserialize;
@@ -163,7 +164,7 @@ fn colmap_points_are_those_of_pycolmap() {
     assert_eq!(cloud.len(), 12, "points");
     for name in ["colmap_binary", "colmap_text"] {
         let path = open(name, Split::Train).points.expect("the model has points");
-        let PointCloud(found) = PointCloud::load(&path).expect("a valid file of points");
+        let PointCloud(found) = PointCloud::load(&path, &Origin::default()).expect("a valid file of points");
         let point = |&(position, color): &(Vec3, [u8; 3])| CloudPoint {
             position,
             color: Some(Vec3::from(color.map(f32::from)) / 255.0),

@@ -2,13 +2,17 @@
 //!
 //! In: small camera files and images written to temporary folders; with `GS4D_DATA` set, trained captures. Out: proof
 //! that cameras in every form and their sizes are read as in the original; images, invalid files and trained captures
-//! are tested in [`images`], [`wrong`] and [`captures`], datasets of other formats in [`formats`], and what other programs have
-//! written and measured in [`independent`].
+//! are tested in [`images`], [`wrong`] and [`captures`], datasets of other formats in [`formats`], COLMAP's folders, names and models in [`colmap`],
+//! what other programs have written and measured in [`independent`], their ways to write camera files in [`variants`], and datasets far from 0 in
+//! [`origins`].
 
 mod captures;
+mod colmap;
 mod formats;
 mod images;
 mod independent;
+mod origins;
+mod variants;
 mod wrong;
 
 use std::fs;
@@ -137,7 +141,9 @@ fn opengl_pose_becomes_opencv_world_to_camera() {
 #[test]
 fn frames_keep_order_names_times_and_paths() {
     let mut frames = ["./test/r_000", "images/c04.JPG", "cam00/frame.001", "other/r_000"].map(frame);
-    frames[1]["time"] = json!(0.25);
+    for (index, frame) in frames.iter_mut().enumerate() {
+        frame["time"] = json!(if index == 1 { 0.25 } else { 0.0 });
+    }
     frames[1]["mask_path"] = json!("./masks/c04.png");
     let folder = Folder::new();
     let path = folder.write_json("transforms_test.json", &with(transforms(), "/frames", json!(frames)));
@@ -145,7 +151,7 @@ fn frames_keep_order_names_times_and_paths() {
     let names: Vec<_> = views.iter().map(|view| view.name.as_str()).collect();
     assert_eq!(names, ["r_000", "c04", "frame.001", "r_000-3"], "stems, with a repeated stem made unique");
     let times: Vec<_> = views.iter().map(|view| view.time).collect();
-    assert_eq!(times, [0.0, 0.25, 0.0, 0.0], "the default time is 0");
+    assert_eq!(times, [0.0, 0.25, 0.0, 0.0], "the times of the frames");
     let images = ["./test/r_000.png", "images/c04.JPG", "cam00/frame.001.png", "other/r_000.png"];
     for (view, image) in views.iter().zip(images) {
         assert_eq!(view.image, folder.path().join(image), "next to the camera file");

@@ -18,12 +18,14 @@ use crate::support::skip::skip;
 fn invalid_entries_are_errors_that_name_file_frame_and_reason() {
     let singular = json!([[1, 0, 0, 0], [2, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]);
     let projective = json!([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 1, 1]]);
-    let three_rows = json!([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]);
+    let two_rows = json!([[1, 0, 0, 0], [0, 1, 0, 0]]);
+    let mirrored = json!([[-1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]);
     let cases = [
         ("/frames/0/transform_matrix", singular, "cannot be inverted"),
         ("/frames/0/transform_matrix", projective, "0 0 0 1"),
-        ("/frames/0/transform_matrix", three_rows, "length 3"),
-        ("/frames/0/transform_matrix", Value::Null, "array of length 4"),
+        ("/frames/0/transform_matrix", two_rows, "four rows"),
+        ("/frames/0/transform_matrix", mirrored, "mirrors"),
+        ("/frames/0/transform_matrix", Value::Null, "four rows"),
         ("/frames/0/transform_matrix/0/0", Value::Null, "null"),
         ("/frames/0/transform_matrix/0/3", json!(1e300), "float32"),
         ("/frames/0/time", json!(1e300), "time"),

@@ -6,6 +6,7 @@ use super::super::DatasetError;
 use super::super::stream::Stream;
 use super::camera::{MODELS, ModelCamera, unknown};
 use super::model::{Model, Registered};
+use super::text::twice;
 use std::collections::HashMap;
 use std::path::Path;
 
@@ -26,7 +27,10 @@ pub(super) fn read(folder: &Path) -> Result<Model, DatasetError> {
             parameters.extend(stream.f64s::<1>()?);
         }
         let camera = ModelCamera::new(model, size, &parameters);
-        cameras.insert(id, camera.map_err(|reason| stream.unusable(format!("camera {id}: {reason}")))?);
+        let camera = camera.map_err(|reason| stream.unusable(format!("camera {id}: {reason}")))?;
+        if cameras.insert(id, camera).is_some() {
+            return Err(stream.unusable(twice(id)));
+        }
     }
     let source = folder.join("images.bin");
     let mut stream = Stream::open(&source)?;

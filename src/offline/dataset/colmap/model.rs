@@ -25,6 +25,20 @@ pub(super) struct Model {
 }
 
 impl Model {
+    /// Returns the camera of an image.
+    ///
+    /// # Errors
+    /// The model does not have it.
+    pub(super) fn camera_of(&self, image: &Registered) -> Result<&ModelCamera, DatasetError> {
+        self.cameras.get(&image.camera).ok_or_else(|| {
+            let reason = format!(
+                "image {:?} has camera {}, which the model does not have: write the model again with COLMAP",
+                image.name, image.camera
+            );
+            DatasetError::Unusable { path: self.source.clone(), reason }
+        })
+    }
+
     /// Returns the error of a problem of an image.
     pub(super) fn failed(&self, image: &Registered) -> impl Fn(FrameProblem) -> DatasetError {
         move |problem| {

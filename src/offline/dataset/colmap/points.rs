@@ -1,12 +1,13 @@
 //! The points of a model: `points3D.bin` and `points3D.txt`.
 //!
-//! In: a file. Out: its points with their colors, without the images that show them.
+//! In: a file, the origin of the views. Out: its points with their colors, without the images that show them.
 
 use super::super::DatasetError;
 use super::super::cloud_point::CloudPoint;
 use super::super::stream::Stream;
 use super::text::{at, contents, is_entry};
-use glam::{DVec3, Vec3};
+use crate::scene::Origin;
+use glam::Vec3;
 use std::path::Path;
 
 /// Bytes of an entry of the track of a point: the number of an image, and of a point in it.
@@ -16,7 +17,7 @@ const TRACKED: u64 = 8;
 ///
 /// # Errors
 /// A file that cannot be read, or ends too early.
-pub(in super::super) fn binary_points(path: &Path) -> Result<Vec<CloudPoint>, DatasetError> {
+pub(in super::super) fn binary_points(path: &Path, origin: &Origin) -> Result<Vec<CloudPoint>, DatasetError> {
     let mut stream = Stream::open(path)?;
     let mut points = Vec::new();
     for _ in 0..stream.u64()? {
@@ -25,7 +26,7 @@ pub(in super::super) fn binary_points(path: &Path) -> Result<Vec<CloudPoint>, Da
         let [_error] = stream.f64s::<1>()?;
         let tracked = stream.u64()?;
         stream.skip(tracked, TRACKED)?;
-        points.push(point(place, color));
+        points.push(point(place, color, origin));
     }
     Ok(points)
 }
@@ -34,13 +35,13 @@ pub(in super::super) fn binary_points(path: &Path) -> Result<Vec<CloudPoint>, Da
 ///
 /// # Errors
 /// A file that cannot be read; a line that is no point.
-pub(in super::super) fn text_points(path: &Path) -> Result<Vec<CloudPoint>, DatasetError> {
+pub(in super::super) fn text_points(path: &Path, origin: &Origin) -> Result<Vec<CloudPoint>, DatasetError> {
     let text = contents(path)?;
     let lines = text.lines().enumerate().filter(|(_, line)| is_entry(line));
-    lines.map(|(number, line)| of_line(line).map_err(|reason| at(path, number, reason))).collect()
+    lines.map(|(number, line)| of_line(line, origin).map_err(|reason| at(path, number, reason))).collect()
 }
 
-fn of_line(line: &str) -> Result<CloudPoint, String> {
+fn of_line(line: &str, origin: &Origin) -> Result<CloudPoint, String> {
     let form = || "must be ID X Y Z R G B ERROR and a track: write the model again with COLMAP".to_owned();
     let mut words = line.split_whitespace().skip(1);
     let mut place = [0.0f64; 3];
@@ -51,10 +52,10 @@ fn of_line(line: &str) -> Result<CloudPoint, String> {
     for value in &mut color {
         *value = words.next().and_then(|word| word.parse().ok()).ok_or_else(form)?;
     }
-    Ok(point(place, color))
+    Ok(point(place, color, origin))
 }
 
-fn point(place: [f64; 3], color: [u8; 3]) -> CloudPoint {
+fn point(place: [f64; 3], color: [u8; 3], origin: &Origin) -> CloudPoint {
     let color = Vec3::from(color.map(f32::from)) / 255.0;
-    CloudPoint { position: DVec3::from(place).as_vec3(), color: Some(color), time: None }
+    CloudPoint::counted_from(origin, place, Some(color), None)
 }

@@ -1,8 +1,10 @@
 //! Text models: `cameras.txt` and `images.txt`.
 //!
-//! In: the folder of a model. Out: its cameras and images. An image has two lines, the second of which has its points.
+//! In: the folder of a model. Out: its cameras and images. An image has two lines, the second of which has its points; where the second lines are
+//! left out, or empty, every line is an image. Names are in UTF-8 or Latin-1.
 
 use super::super::DatasetError;
+use super::super::files::utf8_or_latin1;
 use super::camera::{MODELS, ModelCamera, unknown};
 use super::model::{Model, Registered};
 use std::collections::HashMap;
@@ -13,25 +15,61 @@ pub(super) fn read(folder: &Path) -> Result<Model, DatasetError> {
     let path = folder.join("cameras.txt");
     let mut cameras = HashMap::new();
     for (number, line) in contents(&path)?.lines().enumerate().filter(|(_, line)| is_entry(line)) {
-        let camera = camera(line).map_err(|reason| at(&path, number, reason))?;
-        cameras.insert(camera.0, camera.1);
-    }
-    let source = folder.join("images.txt");
-    let mut images = Vec::new();
-    let text = contents(&source)?;
-    let mut lines = text.lines().enumerate();
-    while let Some((number, line)) = lines.next() {
-        if is_entry(line) {
-            images.push(image(line).map_err(|reason| at(&source, number, reason))?);
-            // The points of the image, possibly none.
-            lines.next();
+        let (id, camera) = camera(line).map_err(|reason| at(&path, number, reason))?;
+        if cameras.insert(id, camera).is_some() {
+            return Err(at(&path, number, twice(id)));
         }
     }
+    let source = folder.join("images.txt");
+    let images = images(&source)?;
     Ok(Model { source, cameras, images })
 }
 
+/// Reads the images of `images.txt`.
+///
+/// # Errors
+/// A file that cannot be read; a line that is neither an image nor the points of the image before it.
+pub(super) fn images(path: &Path) -> Result<Vec<Registered>, DatasetError> {
+    let mut images = Vec::new();
+    // Whether the points of the image before may follow.
+    let mut has_points = false;
+    for (number, line) in contents(path)?.lines().enumerate().filter(|(_, line)| is_entry(line)) {
+        match image(line) {
+            _ if has_points && is_points(line) => has_points = false,
+            Ok(image) => {
+                images.push(image);
+                has_points = true;
+            }
+            Err(reason) if has_points => {
+                let reason =
+                    format!("neither the points of an image, X Y POINT3D_ID each, nor an image: an image {reason}");
+                return Err(at(path, number, reason));
+            }
+            Err(reason) => return Err(at(path, number, reason)),
+        }
+    }
+    Ok(images)
+}
+
+/// Returns whether a line is the points of an image: X, Y and the number of a point for each.
+fn is_points(line: &str) -> bool {
+    let words: Vec<&str> = line.split_whitespace().collect();
+    words.len().is_multiple_of(3) && words.iter().all(|word| word.parse::<f64>().is_ok())
+}
+
+/// Reads a file, without a byte order mark. Lines that are not UTF-8 are read as Latin-1.
 pub(super) fn contents(path: &Path) -> Result<String, DatasetError> {
-    fs::read_to_string(path).map_err(|reason| DatasetError::Read { path: path.to_owned(), reason })
+    let bytes = fs::read(path).map_err(|reason| DatasetError::Read { path: path.to_owned(), reason })?;
+    let text = String::from_utf8(bytes).unwrap_or_else(|error| {
+        let lines = error.as_bytes().split(|byte| *byte == b'\n').map(utf8_or_latin1);
+        lines.collect::<Vec<_>>().join("\n")
+    });
+    Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
+}
+
+/// Returns the reason why a camera that is in a model twice cannot be used.
+pub(super) fn twice(camera: u32) -> String {
+    format!("camera {camera} is in it twice: remove one, or write the model again with COLMAP")
 }
 
 pub(super) fn at(path: &Path, line: usize, reason: String) -> DatasetError {
