@@ -2,10 +2,14 @@
 // In: the inputs and outputs of `project` for one part, the sums of `blend_backward`. Out: the gradients of this view, added to the gradients of
 // the batch.
 // CPU reference: src/gaussian/gradient.rs; equations: sections 7.2 to 7.4 of the 4DGS model. COMPAT: as the original computes them, with
-// the deviations of section 7.5. ATOMIC_SUMS: `blend_backward` has summed over the pairs of each splat.
+// the deviations of section 7.5. ATOMIC_SUMS: `blend_backward` has summed over the pairs of each splat. MIP_FILTER: the opacity of each splat is
+// reduced by the filter of Mip-Splatting, in views whose training pixel is 0.
 #import gs4d::training::{TrainedRecord, TrainedScene}
 #import gs4d::types::{SplatRecord, INVISIBLE}
 #import gs4d::conic::{conic_entries, determinant_of, screen_covariance}
+#ifdef MIP_FILTER
+#import gs4d::conic::{determinant_with_less, LOW_PASS}
+#endif
 #import gs4d::records::{covariance_of, read_splat}
 #import gs4d::tile::tile_count
 #import gs4d::capture::{index_of, instance, load_gaussian}
@@ -181,7 +185,7 @@ fn project_backward(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_w
     let at_length = FIRST_SEEN + scene.total + scene.first + index;
     atomicStore(&notes[at_length], bitcast<u32>(bitcast<f32>(atomicLoad(&notes[at_length])) + length(by_ndc)));
     let by_conic = vec3(-0.5, -1.0, -0.5) * sums.conic;
-    let by_opacity = sums.opacity / splat.opacity;
+    var by_opacity = sums.opacity / splat.opacity;
     let by_color = select(vec3(0.0), sums.color, splat.color > vec3(0.0));
 
     // Section 7.2: the projection, as in `project`.
@@ -206,9 +210,17 @@ fn project_backward(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_w
 #else
     let k = 1.0 / (det * det);
 #endif
-    let by_a = k * (-c * c * by_conic.x + b * c * by_conic.y + (det - a * c) * by_conic.z);
-    let by_c = k * (-a * a * by_conic.z + a * b * by_conic.y + (det - a * c) * by_conic.x);
-    let by_b = k * (2.0 * b * c * by_conic.x - (det + 2.0 * b * b) * by_conic.y + 2.0 * a * b * by_conic.z);
+    var by_a = k * (-c * c * by_conic.x + b * c * by_conic.y + (det - a * c) * by_conic.z);
+    var by_c = k * (-a * a * by_conic.z + a * b * by_conic.y + (det - a * c) * by_conic.x);
+    var by_b = k * (2.0 * b * c * by_conic.x - (det + 2.0 * b * b) * by_conic.y + 2.0 * a * b * by_conic.z);
+#ifdef MIP_FILTER
+    // The factor on opacity is the square root of `rest / det`; a splat that is drawn has a factor above 0.
+    let rest = determinant_with_less(screen, det, vec2(LOW_PASS));
+    by_opacity *= sqrt(rest / det);
+    by_a += 0.5 * sums.opacity * ((c - LOW_PASS) / rest - c / det);
+    by_c += 0.5 * sums.opacity * ((a - LOW_PASS) / rest - a / det);
+    by_b += sums.opacity * b * (1.0 / det - 1.0 / rest);
+#endif
     let by_covariance = outer(mx, by_a * mx + 0.5 * by_b * my) + outer(my, 0.5 * by_b * mx + by_c * my);
     let by_mx = 2.0 * by_a * cx + by_b * cy;
     let by_my = by_b * cx + 2.0 * by_c * cy;

@@ -8,8 +8,6 @@
 
 // Neighbors of each Gaussian, including itself.
 const NEIGHBORS: u32 = 20u;
-// The weight of a neighbor is exp(-FALLOFF distance).
-const FALLOFF: f32 = 100.0;
 // A shorter vector counts as zero: its square underflows.
 const LEAST_LENGTH: f32 = 1e-15;
 
@@ -52,7 +50,7 @@ fn regularize(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgro
     if weights.rigid > 0.0 {
         for (var i = NEIGHBORS * index; i < NEIGHBORS * (index + 1u); i++) {
             let other = gaussians[neighbors[i]];
-            let near = exp(-FALLOFF * distance(own.mean.xyz, other.mean.xyz));
+            let near = exp(-weights.falloff * distance(own.mean.xyz, other.mean.xyz));
             by_velocity += weights.rigid * near * slope_of_length(own.velocity.xyz - other.velocity.xyz);
         }
     }

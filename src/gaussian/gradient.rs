@@ -59,7 +59,7 @@ pub struct SplatGradient {
     pub ndc: [f64; 2],
     /// With respect to its conic: xx, xy (as one number), yy.
     pub conic: [f64; 3],
-    /// With respect to its opacity, the product of opacity and marginal.
+    /// With respect to its opacity, the product of opacity, marginal and the factor of anti-aliasing.
     pub opacity: f64,
     /// With respect to its color after the clamp at 0.
     pub color: [f64; 3],
@@ -103,6 +103,8 @@ pub struct ParameterGradient {
 /// Returns the gradient with respect to the raw parameters of the Gaussian at `index`, from that with respect to its
 /// splat in `view`.
 ///
+/// The factor of anti-aliasing on opacity counts as constant and as 1, unless it is that of Mip-Splatting (a training pixel of 0).
+///
 /// A Gaussian that is not drawn has no pixel, so that `splat` is zero; then the result is zero too. In an orthographic
 /// view the direction of the color and the Jacobian of the projection are constant, and the result is as exact as in
 /// any other.
@@ -122,11 +124,11 @@ pub fn parameter_gradient(
     }
     let gaussian = Moment::new(parameters, index, &settings.slice, f64::from(view.time));
     let color = through_color(&gaussian, harmonics, index, view, settings, DVec3::from(splat.color));
-    let (g_covariance, mut g_mean) = through_projection(&gaussian, view, settings.mode, splat);
+    let (g_covariance, mut g_mean, factor) = through_projection(&gaussian, view, settings.mode, splat);
     if settings.is_displaced() {
         g_mean += color.point;
     }
-    let mut gradient = through_slice(&gaussian, settings, g_covariance, g_mean, splat.opacity);
+    let mut gradient = through_slice(&gaussian, settings, g_covariance, g_mean, splat.opacity * factor);
     if !settings.is_displaced() {
         gradient.mean = (DVec3::from(gradient.mean) + color.point).to_array();
     }
@@ -265,8 +267,13 @@ fn outer(a: DVec3, b: DVec3) -> DMat3 {
 }
 
 /// Returns the gradients with respect to the conditional covariance (symmetric) and the conditional mean: section 7.2
-/// of the 4DGS model.
-fn through_projection(gaussian: &Moment, view: &View, mode: GradientMode, splat: &SplatGradient) -> (DMat3, DVec3) {
+/// of the 4DGS model; and the factor of the filter on opacity.
+fn through_projection(
+    gaussian: &Moment,
+    view: &View,
+    mode: GradientMode,
+    splat: &SplatGradient,
+) -> (DMat3, DVec3, f64) {
     let camera = view.world_to_camera.as_dmat4();
     let to_camera = DMat3::from_mat4(camera);
     let to_capture = to_camera.transpose();
@@ -295,9 +302,10 @@ fn through_projection(gaussian: &Moment, view: &View, mode: GradientMode, splat:
         GradientMode::Exact => det * det,
         GradientMode::Compat => det * det + 1e-7,
     };
-    let g_a = (-c * c * g0 + b * c * g1 + (det - a * c) * g2) / divisor;
-    let g_b = (2.0 * b * c * g0 - (det + 2.0 * b * b) * g1 + 2.0 * a * b * g2) / divisor;
-    let g_c = (-a * a * g2 + a * b * g1 + (det - a * c) * g0) / divisor;
+    let (factor, filtered) = through_filter(view, [a, b, c], splat.opacity * gaussian.opacity * gaussian.marginal);
+    let g_a = (-c * c * g0 + b * c * g1 + (det - a * c) * g2) / divisor + filtered[0];
+    let g_b = (2.0 * b * c * g0 - (det + 2.0 * b * b) * g1 + 2.0 * a * b * g2) / divisor + filtered[1];
+    let g_c = (-a * a * g2 + a * b * g1 + (det - a * c) * g0) / divisor + filtered[2];
     let g_covariance = outer(mx, mx) * g_a + (outer(mx, my) + outer(my, mx)) * (0.5 * g_b) + outer(my, my) * g_c;
     let g_jx = to_camera * (cx * (2.0 * g_a) + cy * g_b);
     let g_jy = to_camera * (cx * g_b + cy * (2.0 * g_c));
@@ -325,7 +333,26 @@ fn through_projection(gaussian: &Moment, view: &View, mode: GradientMode, splat:
         let ndc = row.dot(gaussian.mean_now.extend(1.0)) * inverse_w;
         g_mean += (row.truncate() - row_w * ndc) * (inverse_w * gradient);
     }
-    (g_covariance, g_mean)
+    (g_covariance, g_mean, factor)
+}
+
+/// Returns the factor of the filter of Mip-Splatting on the opacity of a splat with this covariance on the screen (xx, xy, yy, with the low-pass),
+/// and the gradient with respect to that covariance, from that with respect to the factor; 1 and zero in a view without this filter.
+fn through_filter(view: &View, [a, b, c]: [f64; 3], g_factor: f64) -> (f64, [f64; 3]) {
+    if view.trained_pixel != 0.0 {
+        return (1.0, [0.0; 3]);
+    }
+    let (thin_a, thin_c) = (a - f64::from(LOW_PASS), c - f64::from(LOW_PASS));
+    let (thin, det) = (thin_a * thin_c - b * b, a * c - b * b);
+    if thin <= 0.0 {
+        return (0.0, [0.0; 3]);
+    }
+    let factor = (thin / det).sqrt();
+    let half = 0.5 * g_factor * factor;
+    (
+        factor,
+        [half * (thin_c / thin - c / det), 2.0 * half * b * (1.0 / det - 1.0 / thin), half * (thin_a / thin - a / det)],
+    )
 }
 
 /// Gradients with respect to the inputs of the color.

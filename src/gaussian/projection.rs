@@ -93,7 +93,8 @@ pub fn project_with(gaussian: &Gaussian, view: &View, clip: &[Vec4; 2], cutoff: 
 
 /// Returns the factor on the opacity of a splat that the low-pass makes larger than it was in training: the square root of the ratio of
 /// the determinants of its covariances, so that the integral of its alpha stays the same. The original has no such factor, so that
-/// distant captures look thicker. The factor is 1 up to the size of a pixel in training, and in every view without anti-aliasing.
+/// distant captures look thicker. The factor is 1 up to the size of a pixel in training, and in every view without anti-aliasing. With a
+/// pixel of size 0 the factor is that of Mip-Splatting, which is a part of its training.
 /// `per_unit` is in pixels per camera unit.
 fn compensation(view: &View, per_unit: Vec2, screen: &ScreenCovariance) -> f32 {
     let trained = view.trained_variance() * LOW_PASS * per_unit * per_unit;

@@ -119,7 +119,7 @@ impl Chosen {
         let [mut own, mut others, mut empty] = [SquaredError::default(); 3];
         let mut compared = false;
         for (index, view) in self.0.iter().enumerate() {
-            let picture = drawing.draw(&view.camera.view(view.time, scene.trained_with.raster_fov))?.clamped();
+            let picture = drawing.draw(&view.camera.view(view.time, scene.trained_with.optics()))?.clamped();
             own.add(&images[index], &picture)?;
             empty.add(&images[index], &Picture { size: picture.size, pixels: vec![color; picture.pixels.len()] })?;
             for (other, image) in images.iter().enumerate() {

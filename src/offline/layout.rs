@@ -149,6 +149,8 @@ pub struct TermWeights {
     pub opacity: f32,
     /// Weight of each of its spatial scales.
     pub scale: f32,
+    /// The weight of a neighbor is `exp(−falloff d)`, `d` its distance.
+    pub falloff: f32,
 }
 
 /// Input of `noise` for one step.

@@ -3,8 +3,9 @@
 //! In: a scene, the number of views, the picture size. Out: named cameras, each with a time ([`Shot`]).
 
 use super::OfflineError;
+use crate::scene::near::extent;
 use crate::scene::{Bounds, RuntimeScene};
-use crate::view::{Camera, View};
+use crate::view::{Camera, NEAR, View};
 use glam::{UVec2, Vec3};
 use std::f32::consts::TAU;
 
@@ -14,6 +15,10 @@ pub(crate) const ORBIT_SIZE: UVec2 = UVec2::splat(400);
 const FIELD_OF_VIEW: f32 = 0.7;
 /// Elevation of the cameras above the center, radians.
 const ELEVATION: f32 = 0.35;
+/// Least radius of a core around which cameras are placed, near limits.
+const LEAST_RADIUS: f32 = 0.5;
+/// Distance that is added where cores are smaller than half a unit, radii; the near limit of the original is added to larger ones.
+const MARGIN: f32 = 0.4;
 
 /// A named camera at a time.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,7 +34,7 @@ pub struct Shot {
 impl Shot {
     /// Returns the renderer's view of a scene for this shot.
     pub fn view(&self, scene: &RuntimeScene) -> View {
-        self.camera.view(self.time, scene.trained_with.raster_fov)
+        self.camera.view(self.time, scene.trained_with.optics())
     }
 }
 
@@ -42,8 +47,7 @@ pub fn orbit(scene: &RuntimeScene, count: usize, size: UVec2) -> Result<Vec<Shot
     let core = Bounds::core(scene.iter()).ok_or(OfflineError::NothingToOrbit)?;
     let tan_x = (FIELD_OF_VIEW / 2.0).tan();
     let tan = tan_x.min(tan_x * size.y as f32 / size.x as f32);
-    // The sphere around the core touches the sides of the picture; the near limit is added.
-    let distance = core.radius().max(0.1) / tan.atan().sin() + 0.2;
+    let distance = distance(radius(scene, core), scene.trained_with.near, tan.atan());
     let up = scene.playback.up.vector();
     let side = up.any_orthonormal_vector();
     let front = up.cross(side);
@@ -64,6 +68,20 @@ pub fn orbit(scene: &RuntimeScene, count: usize, size: UVec2) -> Result<Vec<Shot
         true => Ok(shots),
         false => Err(OfflineError::TooFarApart),
     }
+}
+
+/// Returns the radius of the sphere that cameras show: that of the core, and of a scene smaller than those of the original its extent.
+fn radius(scene: &RuntimeScene, core: Bounds) -> f32 {
+    let near = scene.trained_with.near;
+    let is_small = near < NEAR || core.radius() < LEAST_RADIUS * near;
+    if is_small { extent(scene.iter()) } else { core.radius() }
+}
+
+/// Returns the distance at which a sphere touches the sides of a picture of this half field of view, and somewhat more. `near` is the near limit
+/// of the scene: the picture is the same at every scale of the scene if that is smaller than the original's.
+fn distance(radius: f32, near: f32, half_field: f32) -> f32 {
+    let radius = radius.max(LEAST_RADIUS * near);
+    radius / half_field.sin() + (MARGIN * radius).min(NEAR).max(near)
 }
 
 /// Returns an evenly spaced subset of at most `count` shots or views, in their order.
@@ -88,6 +106,21 @@ mod tests {
     fn shots(count: usize) -> Vec<Shot> {
         let camera = Camera::look_at(Vec3::X, Vec3::ZERO, Vec3::Z, FIELD_OF_VIEW, ORBIT_SIZE);
         (0..count).map(|index| Shot { name: index.to_string(), camera, time: 0.0 }).collect()
+    }
+
+    #[test]
+    fn distances_are_in_proportion_to_small_scenes_and_as_before_to_others() {
+        let half = (FIELD_OF_VIEW / 2.0).tan().atan();
+        for radius in [0.1f32, 0.3, 2.0, 1e5] {
+            let found = distance(radius, NEAR, half);
+            assert_eq!(found, radius / half.sin() + 0.2, "a radius of {radius} with the near limit of the original");
+        }
+        assert_eq!(distance(0.01, NEAR, half), 0.1 / half.sin() + 0.2, "no closer than that near limit allows");
+        let relative = |radius: f32| distance(radius, 0.1 * radius, half) / radius;
+        for radius in [1e-6, 1e-3, 0.2] {
+            assert!((relative(radius) / relative(0.4) - 1.0).abs() < 1e-5, "in proportion to a radius of {radius}");
+        }
+        assert_eq!(distance(1.0, 0.1, half), 1.0 / half.sin() + 0.2, "from half a unit on the margin stays");
     }
 
     #[test]

@@ -40,7 +40,7 @@ impl Evaluator {
         };
         let load = |view: &TrainingView| view.load_covered().map(|image| image.over(Vec3::from(behind)));
         let truth = views.par_iter().map(load).collect::<Result<Vec<_>, _>>()?;
-        Ok(Self { views: to_draw(views, trained_with.raster_fov), truth, background })
+        Ok(Self { views: to_draw(views, trained_with.optics()), truth, background })
     }
 
     /// Returns an evaluator that compares with the pictures of `scene` itself, for views without images.
@@ -53,7 +53,7 @@ impl Evaluator {
         views: &[TrainingView],
         background: Background,
     ) -> Result<Self, OfflineError> {
-        let views = to_draw(views, scene.trained_with.raster_fov);
+        let views = to_draw(views, scene.trained_with.optics());
         let mut drawing = engine.drawing(scene, background)?;
         let clamped = |view: &View| drawing.draw(view).map(|picture| picture.clamped());
         let truth = views.iter().map(clamped).collect::<Result<Vec<_>, _>>()?;

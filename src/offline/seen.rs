@@ -8,7 +8,7 @@ use super::score::{ScoreEngine, ScoreError, Want};
 use super::shard::Shard;
 use crate::scene::filter::segment_of;
 use crate::scene::{FilterKind, TemporalFilter};
-use crate::view::{Camera, RasterFov, View};
+use crate::view::{Camera, Optics, View};
 
 /// A set of Gaussians: Gaussian `i` at bit `i % 32` of word `i / 32`.
 pub type Mask = Vec<u32>;
@@ -20,20 +20,21 @@ pub struct Drawing {
     set: usize,
 }
 
-/// Returns the drawings of every camera at each key-frame, then those of the views, each for the segment of its time. `interval` is the time
-/// interval, which the key-frames divide evenly.
+/// Returns the drawings of every camera at each key-frame, with the optics of the capture, then those of the views, each for the segment of its
+/// time. `interval` is the time interval, which the key-frames divide evenly.
 pub fn drawings(
     key_frames: &[f32],
     cameras: &[Camera],
     views: &[View],
-    raster_fov: RasterFov,
+    optics: impl Into<Optics>,
     interval: [f32; 2],
 ) -> Vec<Drawing> {
-    let keys = key_frames.len();
+    let (keys, optics) = (key_frames.len(), optics.into());
     let segments = u32::try_from(keys.saturating_sub(1)).unwrap_or(u32::MAX);
-    let at_keys = key_frames.iter().enumerate().flat_map(|(set, &time)| {
-        cameras.iter().map(move |camera| Drawing { view: camera.view(time, raster_fov), set })
-    });
+    let at_keys = key_frames
+        .iter()
+        .enumerate()
+        .flat_map(|(set, &time)| cameras.iter().map(move |camera| Drawing { view: camera.view(time, optics), set }));
     let between =
         views.iter().map(|&view| Drawing { view, set: keys + segment_of(view.time, interval, segments) as usize });
     at_keys.chain(between).collect()

@@ -189,10 +189,10 @@ pub(crate) fn seen(
     shard: Shard,
     progress: &mut dyn Progress,
 ) -> Result<Seen, ScoreError> {
-    let (interval, raster_fov) = (scene.trained_with.time_interval, scene.trained_with.raster_fov);
+    let (interval, optics) = (scene.trained_with.time_interval, scene.trained_with.optics());
     let (times, cameras) = (key_times(interval, keys), distinct_cameras(views));
-    let between = if kind == FilterKind::Interval { to_draw(views, raster_fov) } else { Vec::new() };
-    let drawings = drawings(&times, &cameras, &between, raster_fov, interval);
+    let between = if kind == FilterKind::Interval { to_draw(views, optics) } else { Vec::new() };
+    let drawings = drawings(&times, &cameras, &between, optics, interval);
     Seen::of_shard(scorer, &drawings, times.len(), scene.len(), shard, progress)
 }
 

@@ -5,7 +5,7 @@
 
 use super::dataset::TrainingView;
 use crate::scene::GaussianScene;
-use crate::view::{RasterFov, View};
+use crate::view::{Optics, RasterFov, View};
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -17,8 +17,9 @@ const STRAYS: usize = 100;
 /// out; `None` if no view is left.
 pub(crate) fn trained_pixel(scene: &GaussianScene, views: &[TrainingView]) -> Option<f32> {
     let means = scene.form.means();
+    let optics = Optics { raster_fov: RasterFov::Corrected, ..scene.trained_with.optics() };
     let size_in = |view: &TrainingView| {
-        let view = view.camera.view(view.time, RasterFov::Corrected);
+        let view = view.camera.view(view.time, optics);
         if !shows_any(&view, &means) {
             return None;
         }

@@ -39,15 +39,17 @@ impl Bounds {
     /// where to point a camera, without stray Gaussians. `None` if there is no Gaussian.
     pub fn core(gaussians: impl Iterator<Item = Gaussian>) -> Option<Self> {
         let means: Vec<[f32; 3]> = gaussians.map(|gaussian| gaussian.mean).collect();
-        if means.is_empty() {
-            return None;
-        }
+        Self::core_of(&means)
+    }
+
+    /// Returns the [`core`](Self::core) of Gaussians with these means.
+    pub(crate) fn core_of(means: &[[f32; 3]]) -> Option<Self> {
+        let (low, high) = (means.len() / 20, means.len().checked_sub(1 + means.len() / 20)?);
         let (mut min, mut max) = (Vec3::ZERO, Vec3::ZERO);
         for axis in 0..3 {
             let mut values: Vec<f32> = means.iter().map(|mean| mean[axis]).collect();
-            values.sort_unstable_by(f32::total_cmp);
-            min[axis] = values[values.len() / 20];
-            max[axis] = values[values.len() - 1 - values.len() / 20];
+            min[axis] = *values.select_nth_unstable_by(low, f32::total_cmp).1;
+            max[axis] = *values.select_nth_unstable_by(high, f32::total_cmp).1;
         }
         Some(Self { min, max })
     }

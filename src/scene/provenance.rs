@@ -4,7 +4,7 @@
 //! package so that drawing needs no options.
 
 use crate::gaussian::{MARGINAL_CUTOFF, ShDirection};
-use crate::view::RasterFov;
+use crate::view::{NEAR, Optics, RasterFov};
 use serde::{Deserialize, Serialize};
 
 /// The settings a capture was trained with. Drawing must use the same settings to match the original.
@@ -34,6 +34,16 @@ pub struct TrainedWith {
     pub iteration: u64,
     /// Extent of the training cameras, the factor of positional learning rates. Default: 1.
     pub spatial_lr_scale: f64,
+    /// Near limit of the cameras, capture units: a Gaussian is not drawn unless its depth is larger. Default: 0.2, that of the original.
+    #[serde(skip_serializing_if = "is_the_original_near")]
+    pub near: f32,
+    /// Whether it was trained with the screen-space filter of Mip-Splatting: the opacity of each splat is reduced by what its enlargement by 0.3
+    /// pixels squared adds to its area. Default: `false`.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub mip_filter: bool,
+    /// Where the capture's space and its times begin in the coordinates of the files that it was made from. Default: zeros, the same coordinates.
+    #[serde(skip_serializing_if = "Origin::is_zero")]
+    pub origin: Origin,
     /// Largest size of a pixel of the training views at the Gaussians that they see, capture units. Views of larger pixels may be
     /// anti-aliased ([`View::antialiased`](crate::view::View::antialiased)). Default: `None`, not known.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -47,6 +57,11 @@ pub struct TrainedWith {
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
 fn is_the_original_cutoff(cutoff: &f32) -> bool {
     *cutoff == MARGINAL_CUTOFF
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_the_original_near(near: &f32) -> bool {
+    *near == NEAR
 }
 
 impl Default for TrainedWith {
@@ -63,6 +78,9 @@ impl Default for TrainedWith {
             marginal_cutoff: MARGINAL_CUTOFF,
             iteration: 0,
             spatial_lr_scale: 1.0,
+            near: NEAR,
+            mip_filter: false,
+            origin: Origin::default(),
             pixel: None,
             validation: None,
         }
@@ -70,6 +88,18 @@ impl Default for TrainedWith {
 }
 
 impl TrainedWith {
+    /// Returns how its cameras draw the capture.
+    pub fn optics(&self) -> Optics {
+        let trained_pixel = if self.mip_filter { 0.0 } else { f32::INFINITY };
+        Optics { raster_fov: self.raster_fov, near: self.near, trained_pixel }
+    }
+
+    /// Returns the length that the lengths of training settings are multiples of, capture units: 1, or less in a scene that is so small that its
+    /// near limit is less than that of the original.
+    pub(crate) fn unit_length(&self) -> f64 {
+        f64::from(self.near) / f64::from(NEAR)
+    }
+
     /// Returns the length of the time interval, in the capture's unit.
     pub fn time_span(&self) -> f32 {
         self.time_interval[1] - self.time_interval[0]
@@ -78,6 +108,25 @@ impl TrainedWith {
     /// Returns whether footprints were shaped by the field-of-view sentinel of intrinsics cameras.
     pub fn uses_fov_sentinel(&self) -> bool {
         self.raster_fov == RasterFov::Reference && self.cameras == TrainedCameras::Intrinsics
+    }
+}
+
+/// The origin of a capture in the coordinates of the files that it was made from, where these are so far from 0 that single precision would lose
+/// digits: maps (UTM) and times since 1970. A place of the files is `place` + a mean, a time of the files is `time` + a timestamp; both in the unit
+/// of the files, which is that of the capture. Default: zeros.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Origin {
+    /// The place of the capture's origin.
+    pub place: [f64; 3],
+    /// The time of timestamp 0.
+    pub time: f64,
+}
+
+impl Origin {
+    /// Returns whether places and times are those of the files.
+    pub fn is_zero(&self) -> bool {
+        *self == Self::default()
     }
 }
 
@@ -128,7 +177,7 @@ pub enum UpAxis {
     PosX,
     /// −X.
     NegX,
-    /// +Y, as in Bevy.
+    /// +Y, as in glTF.
     PosY,
     /// −Y.
     NegY,

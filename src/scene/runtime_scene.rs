@@ -10,7 +10,7 @@ use super::form::Form;
 use super::provenance::{PlaybackHints, TrainedWith};
 use super::sliced::Sliced;
 use crate::gaussian::{Gaussian, Harmonics};
-use crate::view::Background;
+use crate::view::{Background, Optics};
 use glam::Vec3;
 use std::sync::Arc;
 
@@ -117,6 +117,15 @@ impl RuntimeScene {
         }
     }
 
+    /// Returns how a level of detail is drawn (0: all Gaussians, also if there is no such level), with the [`antialias_pixel`](Self::antialias_pixel)
+    /// of the same arguments.
+    pub fn optics(&self, level: usize, antialias: bool) -> Optics {
+        let drawn = level.checked_sub(1).and_then(|index| self.levels.get(index));
+        let own = drawn.map_or(&self.trained_with, |level| &level.scene.trained_with).optics();
+        let pixel = self.antialias_pixel(level, antialias).unwrap_or(f32::INFINITY);
+        Optics { trained_pixel: own.trained_pixel.min(pixel), ..self.trained_with.optics() }
+    }
+
     /// Returns the bytes of Gaussians and colors in memory.
     pub fn size(&self) -> usize {
         self.form.size()
@@ -185,6 +194,23 @@ mod tests {
             assert_eq!(scene.antialias_pixel(0, true), pixel, "all Gaussians have the training pixel of the capture");
             assert_eq!(scene.antialias_pixel(2, true), pixel, "a missing level is drawn as all Gaussians");
         }
+    }
+
+    #[test]
+    fn levels_have_the_near_limit_of_the_capture_and_their_own_filter() {
+        let trained = |pixel, near, mip_filter| TrainedWith { pixel, near, mip_filter, ..TrainedWith::default() };
+        let coarse = RuntimeScene { trained_with: trained(Some(0.5), 0.2, false), ..empty() };
+        let scene =
+            RuntimeScene { trained_with: trained(Some(0.25), 0.01, true), levels: vec![level(8.0, coarse)], ..empty() };
+        for antialias in [false, true] {
+            let [all, first] = [0, 1].map(|level| scene.optics(level, antialias));
+            assert_eq!([all.near, first.near], [0.01; 2], "the near limit of the capture");
+            assert_eq!(all.trained_pixel, 0.0, "anti-aliasing does not undo the filter of the capture");
+            assert_eq!(first.trained_pixel, 0.5, "the level was not trained with the filter");
+        }
+        let plain = RuntimeScene { trained_with: trained(Some(0.25), 0.2, false), ..empty() };
+        let pixels = [false, true].map(|antialias| plain.optics(0, antialias).trained_pixel);
+        assert_eq!(pixels, [f32::INFINITY, 0.25], "without a filter only anti-aliasing reduces opacity");
     }
 
     #[test]

@@ -29,18 +29,6 @@ pub enum BlendSpace {
 }
 
 /// The quantity that a view shows of its captures. Default: [`Color`](Self::Color).
-///
-/// # Examples
-///
-/// ```
-/// # #[cfg(feature = "bevy")] {
-/// use bevy_gs4d::prelude::*;
-///
-/// // On a camera: false colors for the number of splats at each pixel.
-/// let settings = CaptureViewSettings { debug: DebugView::Overdraw, ..CaptureViewSettings::default() };
-/// assert_eq!(settings.blend_space, BlendSpace::Encoded, "the other settings keep their defaults");
-/// # }
-/// ```
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum DebugView {
     /// The colors of the captures.

@@ -4,6 +4,7 @@
 //! a time.
 
 use super::View;
+use super::optics::{Optics, RasterFov};
 use glam::{Mat4, UVec2, Vec2, Vec3, Vec4};
 
 /// A camera of a capture: pose, lens and picture size.
@@ -34,19 +35,6 @@ pub enum Lens {
     },
 }
 
-/// The field of view that shapes the footprints of splats seen by an intrinsics camera. Default:
-/// [`Reference`](Self::Reference).
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum RasterFov {
-    /// The original's placeholder of −1 rad on both axes (the *sentinel*), with which its N3V-type captures were
-    /// trained. FoV cameras are not affected.
-    #[default]
-    Reference,
-    /// The camera's true field of view.
-    Corrected,
-}
-
 impl Camera {
     /// Returns the lens of a FoV camera with square pixels, from its horizontal field of view (radians) and picture
     /// size (pixels).
@@ -64,21 +52,23 @@ impl Camera {
         Self { world_to_camera, size, lens: Self::fov_lens(f64::from(fov_x), size) }
     }
 
-    /// Returns the view of this camera at `time`, in the capture's unit.
-    pub fn view(&self, time: f32, raster_fov: RasterFov) -> View {
+    /// Returns the view of this camera at `time`, in the capture's unit. `optics` are those of the capture, or a [`RasterFov`] alone with the
+    /// near limit of the original.
+    pub fn view(&self, time: f32, optics: impl Into<Optics>) -> View {
+        let optics = optics.into();
         let size = self.size.as_vec2();
         let (projection, tan_fov) = match self.lens {
             Lens::Fov { tan } => (Vec4::new(tan.x.recip(), tan.y.recip(), 0.0, 0.0), tan),
             Lens::Intrinsics { focal, center } => {
                 let scale = 2.0 * focal / size;
                 let offset = (2.0 * center - size) / size;
-                let tan = match raster_fov {
+                let tan = match optics.raster_fov {
                     RasterFov::Reference => Vec2::splat((-0.5f64).tan() as f32),
                     RasterFov::Corrected => size / (2.0 * focal),
                 };
                 (Vec4::new(scale.x, scale.y, offset.x, offset.y), tan)
             }
         };
-        View::new(self.size, time, self.world_to_camera, projection, tan_fov)
+        View::new(self.size, time, self.world_to_camera, projection, tan_fov).with_optics(optics)
     }
 }

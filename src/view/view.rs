@@ -4,13 +4,11 @@
 //! conventions (camera space x right, y down, z forward; pixel centers at integers), and the grid of tiles of its
 //! picture.
 
+use super::optics::{NEAR, Optics};
 use glam::{DMat4, DVec4, Mat4, UVec2, Vec2, Vec3, Vec4};
 
 /// Side of a tile in pixels.
 pub const TILE_SIZE: u32 = 16;
-
-/// Near limit of the original, capture units: a Gaussian is not drawn unless its depth is larger.
-const NEAR: f32 = 0.2;
 
 /// One camera at one time: the input of the passes. Includes the model transform of a capture that is placed in a
 /// world.
@@ -32,16 +30,16 @@ pub struct View {
     pub camera_position: Vec3,
     /// Tangents of half the field of view that shapes footprints (negative for the sentinel).
     pub tan_fov: Vec2,
-    /// Near limit in camera units: 0.2 capture units; for an orthographic camera, its near plane.
+    /// Near limit in camera units: that of the capture ([`Optics::near`]), scaled as the capture is; for an orthographic camera, its near plane.
     pub near: f32,
     /// Size of a pixel of the training views where they see the capture, capture units. The opacity of
-    /// splats that larger pixels blur is reduced accordingly. Infinite: no reduction, as in the original.
+    /// splats that larger pixels blur is reduced accordingly. Infinite: no reduction, as in the original. 0: the reduction of Mip-Splatting.
     pub trained_pixel: f32,
 }
 
 impl View {
-    /// Creates a view from its parts; `world_to_camera` may include a model transform (rotation, translation, any
-    /// scale).
+    /// Creates a view from its parts, with the near limit of the original; `world_to_camera` may include a model transform (rotation,
+    /// translation, any scale).
     pub fn new(size: UVec2, time: f32, world_to_camera: Mat4, projection: Vec4, tan_fov: Vec2) -> Self {
         let inverse = world_to_camera.as_dmat4().inverse();
         Self {
@@ -52,8 +50,7 @@ impl View {
             orthographic: false,
             camera_position: inverse.w_axis.truncate().as_vec3(),
             tan_fov,
-            // Depth grows by |row z| camera units for each capture unit along the viewing direction.
-            near: NEAR * world_to_camera.row(2).truncate().length(),
+            near: near_in_camera(NEAR, &world_to_camera),
             trained_pixel: f32::INFINITY,
         }
     }
@@ -74,9 +71,16 @@ impl View {
         }
     }
 
-    /// Returns the view with anti-aliasing, given the size of a pixel of the training views (`None`, not known: without anti-aliasing).
+    /// Returns the view with the near limit and the training pixel of a capture. An orthographic view keeps its near plane.
+    pub fn with_optics(self, optics: Optics) -> Self {
+        let near = if self.orthographic { self.near } else { near_in_camera(optics.near, &self.world_to_camera) };
+        Self { near, trained_pixel: optics.trained_pixel, ..self }
+    }
+
+    /// Returns the view with anti-aliasing, given the size of a pixel of the training views (`None`, not known: without further
+    /// anti-aliasing). Of two sizes the smaller one counts, so that the filter of a capture stays.
     pub fn antialiased(self, trained_pixel: Option<f32>) -> Self {
-        Self { trained_pixel: trained_pixel.unwrap_or(f32::INFINITY), ..self }
+        Self { trained_pixel: trained_pixel.map_or(self.trained_pixel, |pixel| self.trained_pixel.min(pixel)), ..self }
     }
 
     /// Returns the variances across and down the screen of a variance of one training pixel squared, at a scale of one pixel per
@@ -141,6 +145,12 @@ impl View {
     pub fn tiles(&self) -> UVec2 {
         tiles(self.size)
     }
+}
+
+/// Converts a near limit from capture units to camera units.
+fn near_in_camera(near: f32, world_to_camera: &Mat4) -> f32 {
+    // Depth grows by |row z| camera units for each capture unit along the viewing direction.
+    near * world_to_camera.row(2).truncate().length()
 }
 
 /// Returns the number of tiles across and down that cover a picture of this size (pixels).

@@ -1,12 +1,14 @@
 //! Anti-aliasing: views with larger pixels than training had.
 //!
 //! In: a disk of many small Gaussians, drawn by the CPU reference in a small picture, and in a large picture that is averaged down. Out:
-//! proof that small pictures are much closer to the averages with anti-aliasing, and that views with pixels of training size do not change.
+//! proof that small pictures are much closer to the averages with anti-aliasing, that views with pixels of training size do not change, and that
+//! the filter of Mip-Splatting is that of its paper.
 
 use crate::support::blob::blob;
 use bevy_gs4d::gaussian::Harmonics;
+use bevy_gs4d::internal::gaussian::projection::project;
 use bevy_gs4d::reference::render;
-use bevy_gs4d::scene::RuntimeScene;
+use bevy_gs4d::scene::{RuntimeScene, TrainedWith};
 use bevy_gs4d::view::{Background, Camera, Frame, RasterFov, View};
 use glam::{UVec2, Vec3};
 
@@ -34,9 +36,13 @@ fn disk() -> RuntimeScene {
     RuntimeScene::sliced(gaussians, Harmonics { coefficients: 1, degree: 0, degree_t: 0, values })
 }
 
-fn view(side: u32) -> View {
+fn camera(side: u32) -> Camera {
     let eye = Vec3::new(0.0, 0.0, DISTANCE);
-    Camera::look_at(eye, Vec3::ZERO, Vec3::Y, 2.0 * 0.05f32.atan(), UVec2::splat(side)).view(0.5, RasterFov::Corrected)
+    Camera::look_at(eye, Vec3::ZERO, Vec3::Y, 2.0 * 0.05f32.atan(), UVec2::splat(side))
+}
+
+fn view(side: u32) -> View {
+    camera(side).view(0.5, RasterFov::Corrected)
 }
 
 /// Returns the mean square difference of a far picture from the means of the pixels of a near picture.
@@ -60,6 +66,29 @@ fn antialiasing_brings_far_pictures_closer_to_the_mean_of_near_ones() {
     let [plain, smooth] = [far, far.antialiased(Some(PIXEL))].map(|view| error(&render(&disk, &view, BLACK), &near));
     // 10 dB.
     assert!(smooth < 0.1 * plain, "mean square error {smooth} with, {plain} without anti-aliasing");
+}
+
+#[test]
+fn the_filter_of_mip_splatting_is_the_ratio_of_the_areas_without_and_with_the_low_pass() {
+    let mip = TrainedWith { mip_filter: true, ..TrainedWith::default() };
+    for side in [8, 32, 256] {
+        let filtered = camera(side).view(0.5, mip.optics());
+        let per_unit = side as f32 / (2.0 * 0.05 * DISTANCE);
+        for [x, y] in [[0.02, 0.05], [0.5, 0.4], [0.003, 0.9]] {
+            let blob = blob(Vec3::ZERO, Vec3::new(x, y, 0.03), 0.8);
+            let [plain, found] =
+                [view(side), filtered].map(|view| project(&blob, &view).expect("it is in the picture"));
+            let variance = |deviation: f32| (deviation * per_unit).powi(2);
+            let areas = (variance(x) * variance(y)) / ((variance(x) + 0.3) * (variance(y) + 0.3));
+            let expected = 0.8 * areas.sqrt();
+            let opacity = found.opacity;
+            assert!((opacity - expected).abs() < 1e-3, "{x} by {y} in {side} pixels: {opacity}, expected {expected}");
+            assert_eq!((plain.opacity, plain.conic), (0.8, found.conic), "without the filter the same shape is opaque");
+        }
+        for size in [None, Some(PIXEL), Some(100.0 * PIXEL)] {
+            assert_eq!(filtered.antialiased(size), filtered, "anti-aliasing does not undo the filter");
+        }
+    }
 }
 
 #[test]

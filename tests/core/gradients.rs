@@ -6,11 +6,13 @@
 use crate::support::golden_gradients::{GoldenGradient, all_gradients, tensor};
 use bevy_gs4d::gaussian::{GradientMode, Harmonics, Model, Parameters, ShDirection, SliceSettings};
 use bevy_gs4d::internal::gaussian::alpha::{ALPHA_MIN, alpha_at};
-use bevy_gs4d::internal::gaussian::{ParameterGradient, projection};
+use bevy_gs4d::internal::gaussian::{
+    GradientSettings, ParameterGradient, SplatGradient, parameter_gradient, projection,
+};
 use bevy_gs4d::internal::reference::{self, PixelGradients};
 use bevy_gs4d::reference::Layer;
 use bevy_gs4d::scene::{GaussianScene, PlaybackHints, RuntimeScene, SceneForm, Trained, TrainedWith};
-use bevy_gs4d::view::{Appearance, Background, BlendSpace, Camera, RasterFov, View};
+use bevy_gs4d::view::{Appearance, Background, BlendSpace, Camera, Optics, RasterFov, View};
 use glam::{UVec2, Vec2, Vec3, Vec4};
 
 fn norm(values: impl Iterator<Item = f64>) -> f64 {
@@ -341,4 +343,47 @@ fn gradients_in_an_orthographic_view_are_difference_quotients() {
     let projection = Vec4::new(20.0 / SIZE.x as f32, 20.0 / SIZE.y as f32, 0.0, 0.0);
     let view = View::orthographic(SIZE, TIME, case.view.world_to_camera, projection, 0.2);
     assert_differences(&Case { view, ..case });
+}
+
+/// The filter of Mip-Splatting matters to splats of about a pixel, which no picture shows everywhere: the opacity of each splat is the loss.
+#[test]
+fn gradients_through_the_filter_of_mip_splatting_are_difference_quotients() {
+    const STEP: f32 = 2e-3;
+    let mut case = Case::new("filtered", Model::Static3d);
+    case.view = case.view.with_optics(Optics { trained_pixel: 0.0, ..Optics::default() });
+    case.trained.parameters.log_scale.as_flattened_mut().iter_mut().for_each(|scale| *scale -= 3.2);
+    let settings = GradientSettings {
+        slice: case.slice,
+        sh_direction: case.sh_direction,
+        time_span: 1.3,
+        force_sh_3d: false,
+        mode: GradientMode::Exact,
+    };
+    let splat = SplatGradient { opacity: 1.0, ..SplatGradient::default() };
+    let opacity = |trained: &Trained, index: usize| {
+        let gaussian = case.scene(trained).gaussian(index);
+        f64::from(projection::project(&gaussian, &case.view).expect("it is in the picture").opacity)
+    };
+    let Trained { parameters, harmonics } = &case.trained;
+    for kind in &KINDS[..7] {
+        let mut both = Vec::new();
+        for index in 0..GAUSSIANS {
+            let gradient = parameter_gradient(parameters, harmonics, index, &case.view, &settings, &splat);
+            for i in 0..kind.components {
+                let moved = |step: f32| {
+                    let mut trained = case.trained.clone();
+                    let value = (kind.value)(&mut trained, index, i)?;
+                    *value += step;
+                    let value = f64::from(*value);
+                    Some((value, opacity(&trained, index)))
+                };
+                let Some(((low, before), (high, after))) = moved(-STEP).zip(moved(STEP)) else { continue };
+                both.push([(kind.gradient)(&gradient, i), (after - before) / (high - low)]);
+            }
+        }
+        let error = norm(both.iter().map(|[found, difference]| found - difference));
+        let length = norm(both.iter().map(|[found, _]| *found));
+        println!("filtered {:25} norm {length:.1e} error {error:.1e}", kind.name);
+        assert!(error <= 1e-2 * length, "{}: {both:?}", kind.name);
+    }
 }

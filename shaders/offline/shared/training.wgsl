@@ -110,6 +110,8 @@ struct TermWeights {
     opacity: f32,
     // Weight of each of its spatial scales.
     scale: f32,
+    // The weight of a neighbor is exp(-falloff distance).
+    falloff: f32,
 }
 
 // Input of `noise` for one step.

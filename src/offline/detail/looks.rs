@@ -9,12 +9,14 @@ use crate::offline::{OfflineError, Progress, proceed};
 use crate::renderer::{GpuCapture, Headless};
 use crate::scene::detail::pixels_across;
 use crate::scene::{Bounds, RuntimeScene};
-use crate::view::{Background, Camera, Frame, Picture, RasterFov, View};
+use crate::view::{Background, Camera, Frame, Optics, Picture, View};
 use glam::{UVec2, Vec2, Vec3};
 use serde::Serialize;
 
 /// Distance of the cameras from the center of the sphere, radii.
 const DISTANCE: f32 = 10.0;
+/// Least distance of the cameras from the sphere, near limits.
+const NEAREST: f32 = 5.0;
 /// Pixels around the sphere.
 const MARGIN: u32 = 2;
 /// Least number of pixels across the sphere in the pictures that are averaged to the truth: about as many as in training.
@@ -34,6 +36,8 @@ pub(super) struct Sphere {
     pub radius: f32,
     /// The first and the last timestamp that is shown.
     pub shown: [f32; 2],
+    /// Near limit of the capture, capture units.
+    pub near: f32,
 }
 
 /// The directions and times of the views.
@@ -83,19 +87,27 @@ impl Sphere {
         let shown = if scene.playback.duration_seconds > 0.0 { [first, last] } else { [first, first] };
         let bounds = Bounds::of(scene.iter(), shown, scene.trained_with.marginal_cutoff, scene.filter.as_ref())?;
         let (center, radius) = (bounds.center(), bounds.radius());
-        (center.is_finite() && radius.is_finite() && radius > 0.0).then_some(Self { bounds, center, radius, shown })
+        let near = scene.trained_with.near;
+        (center.is_finite() && radius.is_finite() && radius > 0.0).then_some(Self {
+            bounds,
+            center,
+            radius,
+            shown,
+            near,
+        })
     }
 
     /// Returns the view from a direction (of length 1, away from the center) in which the sphere is `pixels` pixels across.
     fn view(&self, direction: Vec3, time: f32, pixels: f32) -> View {
         // No closer than the near limit allows.
-        let distance = (DISTANCE * self.radius).max(self.radius + 1.0);
+        let distance = (DISTANCE * self.radius).max(self.radius + NEAREST * self.near);
         let side = pixels.ceil() as u32 + 2 * MARGIN;
         let focal = pixels / pixels_across(self.radius, distance, 1.0);
         let fov = 2.0 * (side as f32 / (2.0 * focal)).atan();
         let up = if direction.z.abs() > 0.9 { Vec3::X } else { Vec3::Z };
         let eye = self.center + direction * distance;
-        Camera::look_at(eye, self.center, up, fov, UVec2::splat(side)).view(time, RasterFov::Corrected)
+        let optics = Optics { near: self.near, ..Optics::default() };
+        Camera::look_at(eye, self.center, up, fov, UVec2::splat(side)).view(time, optics)
     }
 }
 
@@ -116,7 +128,7 @@ impl Around {
     }
 }
 
-/// Draws all Gaussians from all directions at each of these sizes, pixels. Begins the task "looking".
+/// Draws all Gaussians, whose training pixel is given, from all directions at each of these sizes, pixels. Begins the task "looking".
 pub(super) fn looks(
     headless: &mut Headless,
     capture: &GpuCapture,
@@ -247,10 +259,11 @@ fn rectangle(view: &View, bounds: &Bounds) -> [UVec2; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::view::NEAR;
 
     fn sphere() -> Sphere {
         let bounds = Bounds { min: Vec3::new(-1.0, -0.5, 0.0), max: Vec3::new(1.0, 0.5, 2.0) };
-        Sphere { bounds, center: bounds.center(), radius: bounds.radius(), shown: [0.0, 1.0] }
+        Sphere { bounds, center: bounds.center(), radius: bounds.radius(), shown: [0.0, 1.0], near: NEAR }
     }
 
     #[test]

@@ -104,7 +104,7 @@ pub fn detail(
     require_no_windows(scene.filter.as_ref(), "a level of detail")?;
     scene.levels.clear();
     let full = scene.clone().into_runtime()?;
-    let sphere = Sphere::of(&full).ok_or(OfflineError::NothingToOrbit)?;
+    let sphere = Sphere::of(&full).ok_or(OfflineError::NothingDrawn)?;
     let mut maker = Maker { headless, settings, sphere, full, levels: Vec::new() };
     let made = maker.run(progress)?;
     scene.levels = maker.levels;
@@ -163,7 +163,8 @@ impl Maker<'_> {
         let DetailSettings { directions, times, .. } = *self.settings;
         let around = Around { directions: directions.max(1), times: times.max(1), shift };
         let capture = self.headless.upload(&self.full)?;
-        looks(self.headless, &capture, &self.sphere, self.full.trained_with.pixel, around, sizes, progress)
+        let trained_pixel = Some(self.full.optics(0, true).trained_pixel);
+        looks(self.headless, &capture, &self.sphere, trained_pixel, around, sizes, progress)
     }
 
     /// Makes a level of at most `count` Gaussians, and keeps it if it is close enough at some size.
@@ -187,8 +188,9 @@ impl Maker<'_> {
             trained_with: TrainedWith {
                 prefilter_var: -1.0,
                 spatial_lr_scale: radius.into(),
-                // Always anti-aliased, since levels are drawn where pixels are large.
+                // Always anti-aliased, since levels are drawn where pixels are large, and therefore without another filter.
                 pixel: Some(trained.pixel.unwrap_or(2.0 * radius / FINE)),
+                mip_filter: false,
                 ..trained.clone()
             },
             playback: self.full.playback,

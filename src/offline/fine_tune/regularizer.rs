@@ -1,11 +1,11 @@
 //! The terms of the loss that depend on Gaussians alone, in training.
 //!
-//! In: weights, the parameters that are trained. Out: gradients, added to those of the batch.
+//! In: weights, the unit of length, the parameters that are trained. Out: gradients, added to those of the batch.
 
 use super::neighbors::{NEIGHBORS, neighbors};
 use super::optimized::{Optimized, across_and_down};
 use super::parameters::{ParameterBuffers, TrainedPart};
-use super::terms::{MOMENT, Terms};
+use super::terms::{FALLOFF, MOMENT, Terms};
 use crate::offline::layout::{TermWeights, TrainedRecord, TrainedScene};
 use crate::offline::shaders::SHADERS;
 use crate::renderer::bind::{Bind, group_layout, pipeline};
@@ -26,11 +26,16 @@ pub(super) struct Regularizer {
 }
 
 impl Regularizer {
-    /// Compiles the pass for terms with these weights.
+    /// Compiles the pass for terms with these weights and this unit of length, capture units.
     ///
     /// # Errors
     /// A rigid term of more Gaussians than a binding holds, a shader that does not compile.
-    pub(super) fn new(headless: &Headless, parameters: &ParameterBuffers, terms: &Terms) -> Result<Self, GpuError> {
+    pub(super) fn new(
+        headless: &Headless,
+        parameters: &ParameterBuffers,
+        terms: &Terms,
+        unit: f64,
+    ) -> Result<Self, GpuError> {
         use Bind::{Read, Uniform, Write};
         let (allocator, device) = (headless.allocator(), &headless.context().device);
         let count = parameters.count() as usize;
@@ -41,10 +46,11 @@ impl Regularizer {
         let weights = allocator.buffer("gs4d weights of terms", sizes[1] as u64, BufferUsages::UNIFORM);
         let share = 1.0 / count as f64;
         let settings = TermWeights {
-            motion: (terms.motion * MOMENT * share) as f32,
-            rigid: (terms.rigid * MOMENT * share / NEIGHBORS as f64) as f32,
+            motion: (terms.motion * MOMENT * share / unit) as f32,
+            rigid: (terms.rigid * MOMENT * share / NEIGHBORS as f64 / unit) as f32,
             opacity: (terms.opacity * share) as f32,
-            scale: (terms.scale * share / 3.0) as f32,
+            scale: (terms.scale * share / 3.0 / unit) as f32,
+            falloff: (FALLOFF / unit) as f32,
         };
         headless.context().queue.write_buffer(&weights, 0, bytemuck::bytes_of(&settings));
         let search_every = (terms.rigid > 0.0).then(|| terms.search_every.max(1));

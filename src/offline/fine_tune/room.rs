@@ -12,7 +12,7 @@ use crate::renderer::memory::{binding_limit, with_room};
 use crate::renderer::{GpuError, Headless};
 
 /// The options that ask for less.
-const REMEDY: &str = "--gaussians and --sh-degree make them fewer or smaller";
+const REMEDY: &str = "--gaussians makes them fewer, gs4d train --sh-degree smaller";
 
 /// Largest buffer that is created to see whether the GPU has memory, bytes.
 const PIECE: u64 = 1 << 30;

@@ -10,7 +10,7 @@ use crate::scene::random::Random;
 pub struct Rates {
     /// Of the mean, in units of `spatial_lr_scale`.
     pub mean: f64,
-    /// Of the temporal mean, in the same units.
+    /// Of the temporal mean, in units of `spatial_lr_scale`, whose lengths are relative to the unit of a small scene.
     pub mean_t: f64,
     /// Of the logarithms of all scales.
     pub scale: f64,
@@ -45,12 +45,13 @@ impl Rates {
     /// Ours: the mean moves as fast as when training begins, since the Gaussians that are left spread into the place of the others.
     pub const OURS: Self = Self { mean: 1.6e-4, ..Self::ORIGINAL };
 
-    /// Returns the rates of the first four four-vectors of each Gaussian's raw parameters and of the fifth, as `adam` reads them.
-    pub(crate) fn of_parameters(&self, spatial_lr_scale: f64, factor: f64) -> [[f32; 4]; 5] {
+    /// Returns the rates of the first four four-vectors of each Gaussian's raw parameters and of the fifth, as `adam` reads them. `unit` is the
+    /// unit of length, capture units.
+    pub(crate) fn of_parameters(&self, spatial_lr_scale: f64, unit: f64, factor: f64) -> [[f32; 4]; 5] {
         let rate = |rate: f64| (rate * factor) as f32;
         let mean = rate(self.mean * spatial_lr_scale);
         [
-            [mean, mean, mean, rate(self.mean_t * spatial_lr_scale)],
+            [mean, mean, mean, rate(self.mean_t * spatial_lr_scale / unit)],
             [rate(self.scale); 4],
             [rate(self.rotation); 4],
             [rate(self.rotation); 4],

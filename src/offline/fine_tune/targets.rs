@@ -86,7 +86,7 @@ impl TrainingImages {
         needed(&views, validation, room).require_loaded(BY_RESOLUTION)?;
         let shots = |views: &[TrainingView]| -> Vec<Shot> {
             let shot = |view: &TrainingView| Shot {
-                view: view.camera.view(view.time, trained_with.raster_fov),
+                view: view.camera.view(view.time, trained_with.optics()),
                 name: view.name.clone(),
                 image: None,
             };

@@ -1,6 +1,6 @@
 //! Further terms of the loss; CPU reference of `shaders/offline/regularize.wgsl`.
 //!
-//! In: raw parameters, the neighbors of each Gaussian, weights. Out: the terms that depend on Gaussians alone, and the gradient of their
+//! In: raw parameters, the neighbors of each Gaussian, weights, the unit of length. Out: the terms that depend on Gaussians alone, and the gradient of their
 //! weighted sum. These are, with `u` 0.1 times the velocity c/v (section 6 of the 4DGS model; the original has no terms of opacity and scale):
 //!
 //! | term | value |
@@ -9,6 +9,9 @@
 //! | rigid | the mean over Gaussians and their [`NEIGHBORS`] of `exp(−100 d) ‖u − u of the neighbor‖`, `d` their distance |
 //! | opacity | the mean over Gaussians of the peak opacity |
 //! | scale | the mean over Gaussians and their three spatial axes of the scale |
+//!
+//! Lengths are in units of 1, or of less in a small scene ([`TrainedWith::unit_length`](crate::scene::TrainedWith)), so that terms do not depend on
+//! the scale of the scene.
 //!
 //! In the rigid term a Gaussian is drawn to its neighbors as they are: distances and the neighbors' velocities are constant. The original
 //! lets the gradient through to the velocities of the neighbors too, which doubles it where two are neighbors of each other.
@@ -23,7 +26,7 @@ use glam::DVec3;
 /// Time over which motion counts, timestamp units.
 pub(super) const MOMENT: f64 = 0.1;
 /// The weight of a neighbor is `exp(−FALLOFF d)`.
-const FALLOFF: f64 = 100.0;
+pub(super) const FALLOFF: f64 = 100.0;
 /// A shorter vector has no direction.
 const LEAST_LENGTH: f64 = 1e-15;
 
@@ -85,7 +88,7 @@ pub struct Regularization {
     pub gradients: Vec<ParameterGradient>,
 }
 
-/// Computes the terms. `neighbors` are those of `neighbors`); without any the rigid term is 0.
+/// Computes the terms. `neighbors` are those of `neighbors`); without any the rigid term is 0. `unit` is the unit of length, capture units.
 ///
 /// # Errors
 /// A Gaussian that cannot be drawn.
@@ -96,9 +99,11 @@ pub fn regularization(
     parameters: &Parameters,
     neighbors: &[u32],
     terms: &Terms,
+    unit: f64,
 ) -> Result<Regularization, InvalidGaussian> {
     let count = parameters.len();
-    let moves: Vec<DVec3> = (0..count).map(|index| movement(parameters, index)).collect::<Result<_, _>>()?;
+    let moved = |index| movement(parameters, index).map(|moved| moved / unit);
+    let moves: Vec<DVec3> = (0..count).map(moved).collect::<Result<_, _>>()?;
     let place = |index: usize| DVec3::from(parameters.mean[index].map(f64::from));
     let share = 1.0 / count.max(1) as f64;
     let mut all =
@@ -108,15 +113,15 @@ pub fn regularization(
         let mut by_move = terms.motion * slope_of_length(own);
         let around = neighbors.get(NEIGHBORS * index..NEIGHBORS * (index + 1)).unwrap_or_default();
         for other in around.iter().map(|&other| other as usize) {
-            let near = (-FALLOFF * place(index).distance(place(other))).exp() / NEIGHBORS as f64;
+            let near = (-FALLOFF * place(index).distance(place(other)) / unit).exp() / NEIGHBORS as f64;
             let difference = own - moves[other];
             all.rigid += share * near * difference.length();
             by_move += terms.rigid * near * slope_of_length(difference);
         }
         all.opacity += share / (1.0 + (-f64::from(parameters.opacity_logit[index])).exp());
-        let mut gradient = slice_gradient(parameters, index, share * MOMENT * by_move, share * terms.opacity);
+        let mut gradient = slice_gradient(parameters, index, share * MOMENT / unit * by_move, share * terms.opacity);
         for (slope, log_scale) in gradient.log_scale.iter_mut().zip(parameters.log_scale[index]) {
-            let scale = share / 3.0 * f64::from(log_scale).exp();
+            let scale = share / 3.0 * f64::from(log_scale).exp() / unit;
             all.scale += scale;
             *slope += terms.scale * scale;
         }
@@ -182,7 +187,7 @@ mod tests {
         for (name, terms, moved) in
             [("motion", motion, 3), ("rigid", rigid, 1), ("opacity", opacity, 3), ("scale", scale, 3)]
         {
-            let of = |parameters: &Parameters| regularization(parameters, &neighbors, &terms).expect("valid");
+            let of = |parameters: &Parameters| regularization(parameters, &neighbors, &terms, 1.0).expect("valid");
             let loss = |parameters: &Parameters| {
                 let found = of(parameters);
                 terms.motion * found.motion
@@ -213,7 +218,7 @@ mod tests {
     fn terms_are_means_over_the_gaussians() {
         let parameters = three();
         let neighbors: Vec<u32> = [vec![0, 1], vec![0; 18], vec![1; 20], vec![2; 20]].concat();
-        let found = regularization(&parameters, &neighbors, &Terms::default()).expect("they can be drawn");
+        let found = regularization(&parameters, &neighbors, &Terms::default(), 1.0).expect("they can be drawn");
         let sliced = parameters.slice(&Default::default()).expect("they can be drawn");
         let moves: Vec<DVec3> = sliced.iter().map(|g| 0.1 * DVec3::from(g.velocity.map(f64::from))).collect();
         let motion = moves.iter().map(|own| own.length()).sum::<f64>() / 3.0;
@@ -229,12 +234,33 @@ mod tests {
     }
 
     #[test]
+    fn terms_do_not_depend_on_the_scale_of_the_scene() {
+        let neighbors: Vec<u32> = [vec![0, 1], vec![0; 18], vec![1; 20], vec![2; 20]].concat();
+        let terms = Terms { motion: 0.8, rigid: 2.5, opacity: 0.3, scale: 0.3, ..Terms::default() };
+        let scaled = |scale: f32| {
+            let mut parameters = three();
+            parameters.mean.as_flattened_mut().iter_mut().for_each(|value| *value *= scale);
+            parameters.log_scale.as_flattened_mut().iter_mut().for_each(|value| *value += scale.ln());
+            // A rotation mixes lengths and times, so that only Gaussians that are not rotated are the same at every scale.
+            let unrotated = vec![[1.0, 0.0, 0.0, 0.0]; 3];
+            (parameters.rotation_l, parameters.rotation_r) = (unrotated.clone(), unrotated);
+            regularization(&parameters, &neighbors, &terms, scale.into()).expect("they can be drawn")
+        };
+        let (usual, tiny) = (scaled(1.0), scaled(0.001));
+        assert!((tiny.scale / usual.scale - 1.0).abs() < 1e-5, "scale: {} and {}", tiny.scale, usual.scale);
+        for (tiny, usual) in tiny.gradients.iter().zip(&usual.gradients) {
+            let error = tiny.log_scale.iter().zip(usual.log_scale).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(error < 1e-6, "the gradients of the scales differ by {error}");
+        }
+    }
+
+    #[test]
     fn gaussians_at_rest_have_no_motion() {
         let unrotated = Parameters { rotation_r: Vec::new(), ..three() };
         let fixed = Parameters { mean_t: Vec::new(), log_scale_t: Vec::new(), ..unrotated.clone() };
         let terms = Terms { motion: 1.0, rigid: 1.0, ..Terms::default() };
         for parameters in [unrotated, fixed] {
-            let found = regularization(&parameters, &[0; 60], &terms).expect("they can be drawn");
+            let found = regularization(&parameters, &[0; 60], &terms, 1.0).expect("they can be drawn");
             assert_eq!((found.motion, found.rigid), (0.0, 0.0), "in {:?}", parameters.model());
             let still = |gradient: &ParameterGradient| slopes(gradient).iter().all(|slope| *slope == 0.0);
             assert!(found.gradients.iter().all(still), "and no gradient: {:?}", found.gradients);

@@ -47,7 +47,7 @@ use crate::gaussian::{GradientMode, Model};
 use crate::offline::dataset::CoveredImage;
 use crate::offline::layout::{LossUniforms, NoiseUniforms, TrainedRecord};
 use crate::offline::quantize::codebook::Centers;
-use crate::offline::shaders::{COMPAT, COMPAT_WITHOUT_TIME};
+use crate::offline::shaders::{COMPAT, COMPAT_WITHOUT_TIME, MIP_FILTER};
 use crate::renderer::memory::with_room;
 use crate::renderer::{GpuCapture, GpuError, Headless, ShaderChecks};
 use crate::scene::{Bits, Environment, GaussianScene, SceneForm, TemporalFilter, Trained};
@@ -56,7 +56,7 @@ use std::collections::VecDeque;
 use std::iter;
 
 /// Steps that may be submitted before the first of them has finished.
-const STEPS_IN_FLIGHT: usize = 4;
+pub const STEPS_IN_FLIGHT: usize = 4;
 
 /// What a step of training from pictures alone has beside the step of the optimizer.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -128,7 +128,8 @@ impl<'a> Trainer<'a> {
             GradientMode::Compat if plain => COMPAT_WITHOUT_TIME,
             GradientMode::Compat => COMPAT,
         };
-        let definitions = [definitions, sums.definitions()].concat();
+        let filter = if scene.trained_with.mip_filter { MIP_FILTER } else { &[] };
+        let definitions = [definitions, sums.definitions(), filter].concat();
         let passes = Passes::new(headless, &definitions, ShaderChecks::Off)?;
         let degrees = runtime.form.color_degrees();
         let stride = stride(degrees.degree, degrees.degree_t);
@@ -219,8 +220,9 @@ impl<'a> Trainer<'a> {
         if let Some((term, weight)) = terms.wrong() {
             return Err(TrainerError::Weight { term, weight });
         }
+        let unit = self.scene.trained_with.unit_length();
         self.regularizer = match terms.is_regularizing() {
-            true => Some(Regularizer::new(self.headless, &self.parameters, &terms)?),
+            true => Some(Regularizer::new(self.headless, &self.parameters, &terms, unit)?),
             false => None,
         };
         self.mask_weight = terms.mask as f32;
@@ -454,7 +456,8 @@ impl<'a> Trainer<'a> {
         let ParameterBuffers { geometry, parts, .. } = parameters;
         let colors = rates.of_harmonics(factor);
         let spatial_lr_scale = self.scene.trained_with.spatial_lr_scale;
-        let geometry_rates = rates.of_parameters(spatial_lr_scale, factor);
+        let unit = self.scene.trained_with.unit_length();
+        let geometry_rates = rates.of_parameters(spatial_lr_scale, unit, factor);
         let all = Extent { sparse: *sparse, values: None };
         let of_color = Extent { values: growth.map(|growth| growth.color_values), ..all };
         let mut rated = vec![(geometry, geometry_rates, all)];
@@ -485,7 +488,8 @@ impl<'a> Trainer<'a> {
                 exposure.record_step(queue, &mut pass, passes, (rates.exposure * factor) as f32, step);
             }
             if let (Some(grower), Some(StepGrowth { noise, least_time_scale, seed, .. })) = (&self.grower, growth) {
-                let strength = (noise * rates.mean * spatial_lr_scale * factor) as f32;
+                // Times a variance it is the deviation, a length, as the rate alone is.
+                let strength = (noise * rates.mean * spatial_lr_scale * factor / (unit * unit)) as f32;
                 let least = least_time_scale * f64::from(self.scene.trained_with.time_span());
                 let least_log_scale_t = least.max(f64::from(f32::MIN_POSITIVE)).ln() as f32;
                 let settings = NoiseUniforms { count: parameters.count(), seed, strength, least_log_scale_t };

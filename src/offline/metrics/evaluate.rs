@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::{MAX_PSNR, SizeMismatch, SquaredError, flip, ms_ssim, ssim};
 use crate::offline::dataset::{DatasetError, TrainingView};
 use crate::scene::TrainedWith;
-use crate::view::{Picture, RasterFov, View};
+use crate::view::{Optics, Picture, View};
 
 /// Which metrics to compute in addition to PSNR. Each takes longer than the one before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -184,8 +184,8 @@ pub struct Contrast {
 pub struct EvaluationSettings {
     /// Color behind pixels that an image does not cover, RGB, 0 to 1.
     pub background: [f32; 3],
-    /// Which field of view determines the footprints.
-    pub raster_fov: RasterFov,
+    /// How the cameras of the views draw the capture.
+    pub optics: Optics,
     /// Which metrics to compute.
     pub metrics: MetricSet,
     /// Number of views that are compared at the same time, by as many threads.
@@ -193,9 +193,9 @@ pub struct EvaluationSettings {
 }
 
 impl EvaluationSettings {
-    /// Returns settings with the background and the field of view that the capture was trained with, for one view at a time.
+    /// Returns settings with the background and the optics that the capture was trained with, for one view at a time.
     pub fn of(trained: &TrainedWith, metrics: MetricSet) -> Self {
-        Self { background: trained.background, raster_fov: trained.raster_fov, metrics, at_once: 1 }
+        Self { background: trained.background, optics: trained.optics(), metrics, at_once: 1 }
     }
 }
 
@@ -221,7 +221,7 @@ where
         for (view, image) in some.iter().zip(images) {
             let image = image?;
             has_gaps |= image.has_gaps;
-            let render = draw(&view.camera.view(view.time, settings.raster_fov))?;
+            let render = draw(&view.camera.view(view.time, settings.optics))?;
             pairs.push((image.over(Vec3::from(settings.background)), render));
         }
         let compare =

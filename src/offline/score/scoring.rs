@@ -50,7 +50,7 @@ impl ScoringSettings {
         Pictures::looked_at(views).require(engine.headless(), BY_RESOLUTION)?;
         let traits = Traits::of(&subject.scene)?;
         let views = subset(views.to_vec(), self.views);
-        let views = to_draw(&views, subject.runtime.trained_with.raster_fov);
+        let views = to_draw(&views, subject.runtime.trained_with.optics());
         let mut scorer = engine.scorer(&subject.runtime, subject.background)?;
         progress.begin("scoring", Scores::count(&views, shard));
         let scores = Scores::of_shard(scorer.as_mut(), &traits, &views, &self.score, shard, progress)?;

@@ -3,33 +3,41 @@
 //! In: training views, what their times mean, optionally an interval of time and a duration. Out: [`TrainedWith`] and [`PlaybackHints`].
 
 use super::error::StartError;
+use super::region::Region;
+use crate::offline::dataset::selection::to_draw;
 use crate::offline::dataset::{Clock, TrainingView};
-use crate::scene::{PlaybackHints, TrainedCameras, TrainedWith, UpAxis};
+use crate::scene::near::near_limit;
+use crate::scene::{Origin, PlaybackHints, TrainedCameras, TrainedWith, UpAxis};
 use crate::view::{Lens, RasterFov};
 use glam::{DVec3, Vec3};
 
 /// The extent of the cameras is the largest distance from their center times this.
 const EXTENT: f64 = 1.1;
+/// Largest distance of cameras from what they look at that counts, extents.
+const FARTHEST: f32 = 5.0;
 /// Cameras closer together than this share of their distance from the origin stand in one place.
 const ONE_PLACE: f64 = 1e-6;
 
 const AXES: [UpAxis; 6] = [UpAxis::PosX, UpAxis::NegX, UpAxis::PosY, UpAxis::NegY, UpAxis::PosZ, UpAxis::NegZ];
 
-/// What a capture is trained with that views do not say. Default: the interval of the views, black behind.
+/// What a capture is trained with that views do not say. Default: the interval of the views, black behind, the coordinates of the dataset.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct CaptureSettings {
-    /// First and last time; `None`: 0 to 1 if no view is outside and frames are not numbered, else from the first to the last time of the views.
-    pub time_interval: Option<[f32; 2]>,
+    /// First and last time, as the dataset counts times; `None`: 0 to 1 if no view is outside, frames are not numbered and times have no origin of their
+    /// own, else from the first to the last time of the views.
+    pub time_interval: Option<[f64; 2]>,
     /// Background color, in the space of the images.
     pub background: [f32; 3],
     /// Seconds of one pass through the interval at speed 1, 0 for a still; `None`: as the dataset says, else one second for each unit of time.
     pub duration_seconds: Option<f32>,
+    /// The origin of the views in the coordinates of the dataset.
+    pub origin: Origin,
 }
 
 /// Returns the settings of a capture of these views, whose times mean this.
 ///
 /// # Errors
-/// Views from one place, a time that is not finite.
+/// Views from one place, a time that is not finite, an interval without length.
 pub fn capture_of(
     views: &[TrainingView],
     settings: &CaptureSettings,
@@ -39,7 +47,9 @@ pub fn capture_of(
         return Err(StartError::Time { view: view.name.clone() });
     }
     let spatial_lr_scale = extent(views).ok_or(StartError::OnePlace { views: views.len() })?;
-    let time_interval = settings.time_interval.unwrap_or_else(|| interval(views, clock.is_numbered));
+    let origin = settings.origin;
+    let given = settings.time_interval.map(|interval| counted_from(origin.time, interval)).transpose()?;
+    let time_interval = given.unwrap_or_else(|| interval(views, clock.is_numbered || origin.time != 0.0));
     let is_intrinsic = |view: &TrainingView| matches!(view.camera.lens, Lens::Intrinsics { .. });
     let cameras = if views.iter().any(is_intrinsic) { TrainedCameras::Intrinsics } else { TrainedCameras::Fov };
     let trained_with = TrainedWith {
@@ -48,6 +58,8 @@ pub fn capture_of(
         raster_fov: RasterFov::Corrected,
         cameras,
         spatial_lr_scale,
+        near: near_limit(size(views, spatial_lr_scale)),
+        origin,
         ..TrainedWith::default()
     };
     let of_dataset = Some(trained_with.time_span() * clock.unit_seconds).filter(|seconds| seconds.is_finite());
@@ -64,8 +76,28 @@ fn extent(views: &[TrainingView]) -> Option<f64> {
     (farthest > ONE_PLACE * middle.length().max(f64::MIN_POSITIVE)).then_some(EXTENT * farthest)
 }
 
+/// Returns the size of the scene as its cameras tell it: the distance of the median camera from what all look at, from one to five times their
+/// extent. Where cameras that are close together look nearly the same way, what all look at is not known well.
+fn size(views: &[TrainingView], extent: f64) -> f32 {
+    let drawn = to_draw(views, RasterFov::Corrected);
+    let distance = Region::of(drawn.iter()).ok().and_then(|region| {
+        let mut distances: Vec<f32> = drawn.iter().map(|view| view.camera_position.distance(region.center)).collect();
+        distances.sort_unstable_by(f32::total_cmp);
+        distances.get(distances.len() / 2).copied()
+    });
+    let extent = extent as f32;
+    distance.unwrap_or(extent).min(FARTHEST * extent).max(extent)
+}
+
 fn center(view: &TrainingView) -> Vec3 {
     view.camera.world_to_camera.inverse().w_axis.truncate()
+}
+
+/// Returns an interval of the dataset in the times of the capture.
+fn counted_from(origin: f64, interval: [f64; 2]) -> Result<[f32; 2], StartError> {
+    let [first, last] = interval.map(|time| (time - origin) as f32);
+    let is_whole = first < last && (last - first).is_finite();
+    if is_whole { Ok([first, last]) } else { Err(StartError::Interval { interval }) }
 }
 
 /// Returns 0 to 1 if no view is outside and frames are not numbered; else the first and the last time, or one unit from the only time.
@@ -92,7 +124,7 @@ fn up(views: &[TrainingView]) -> UpAxis {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::view::Camera;
+    use crate::view::{Camera, NEAR};
     use glam::UVec2;
 
     fn view(eye: Vec3, up: Vec3, time: f32) -> TrainingView {
@@ -126,6 +158,22 @@ mod tests {
     }
 
     #[test]
+    fn times_of_an_origin_are_no_shares() {
+        let views = [view(Vec3::X, Vec3::Z, 0.25), view(Vec3::Y, Vec3::Z, 0.75)];
+        let origin = Origin { place: [0.0; 3], time: 1_700_000_000.0 };
+        let of = |time_interval| {
+            let settings = CaptureSettings { time_interval, origin, ..CaptureSettings::default() };
+            capture_of(&views, &settings, Clock::default()).map(|(trained_with, _)| trained_with)
+        };
+        let found = of(None).expect("two places");
+        assert_eq!((found.time_interval, found.origin), ([0.25, 0.75], origin), "from the first view to the last");
+        let found = of(Some([1_700_000_000.0, 1_700_000_000.5])).expect("two places").time_interval;
+        assert_eq!(found, [0.0, 0.5], "an interval of the dataset is counted from the origin");
+        let empty = [1_700_000_000.0, 1_700_000_000.0 + 1e-7];
+        assert_eq!(of(Some(empty)), Err(StartError::Interval { interval: empty }), "an interval without length");
+    }
+
+    #[test]
     fn the_duration_is_given_or_that_of_the_dataset() {
         let views = [view(Vec3::X, Vec3::Z, 0.0), view(Vec3::Y, Vec3::Z, 2.0)];
         let seconds = |duration_seconds, unit| {
@@ -145,6 +193,20 @@ mod tests {
             capture_of(&views, &CaptureSettings::default(), Clock::default()).expect("two places");
         assert!((trained_with.spatial_lr_scale - 4.4).abs() < 1e-5, "1.1 times 4: {}", trained_with.spatial_lr_scale);
         assert_eq!((playback.up, playback.duration_seconds), (UpAxis::PosY, 1.0), "up and duration");
+    }
+
+    #[test]
+    fn the_near_limit_is_that_of_the_original_unless_the_cameras_are_close_together() {
+        let near = |scale: f32| {
+            let views = [view(Vec3::X * scale, Vec3::Z, 0.0), view(Vec3::Y * scale, Vec3::Z, 1.0)];
+            capture_of(&views, &CaptureSettings::default(), Clock::default()).expect("two places").0.near
+        };
+        for scale in [1e4, 4.0, 2.1] {
+            assert_eq!(near(scale), NEAR, "cameras {scale} units from what they look at");
+        }
+        for scale in [1.0, 0.05, 0.003] {
+            assert!((near(scale) / (0.1 * scale) - 1.0).abs() < 1e-4, "a tenth of {scale}: {}", near(scale));
+        }
     }
 
     #[test]

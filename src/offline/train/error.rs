@@ -17,6 +17,12 @@ pub enum StartError {
         /// Name of the view.
         view: String,
     },
+    /// An interval whose ends are one number in single precision.
+    #[error("the time interval {},{} has no length in single precision: give the first and the last time of the dataset", .interval[0], .interval[1])]
+    Interval {
+        /// First and last time, as given.
+        interval: [f64; 2],
+    },
     /// The cameras look at nothing together.
     #[error(
         "the training cameras look away from each other, so that they have no region in common (are they inside of what they show?): give views of one \

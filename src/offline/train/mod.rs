@@ -32,6 +32,7 @@ pub use capture::{CaptureSettings, capture_of};
 pub use error::StartError;
 pub use once::{train_dataset, trained_path};
 pub use start::{Start, StartSettings, begin};
+pub(crate) use training::Divided;
 pub use training::{TrainSettings, TrainedCapture, Training};
 
 use super::fine_tune::{FineTuneSettings, FineTuned, Resume, Scene, TrainingImages, fine_tune_watched};

@@ -26,7 +26,7 @@ use glam::Vec3;
 const OPACITY: f32 = 0.1;
 /// Temporal scale, as a share of the interval, unless moments are further apart.
 const USUAL_TIME_SCALE: f64 = 0.1;
-/// Least squared scale.
+/// Least squared scale, units of length squared.
 const LEAST_SQUARE: f32 = 1e-7;
 /// Nearest points that give the scale.
 const NEAREST: usize = 3;
@@ -118,13 +118,14 @@ pub fn begin(
         return Err(StartError::NoSurroundings);
     }
     let region = Region::of(images.all_views());
-    let (points, start) = points(&pairs, region, trained_with.time_interval, settings, cloud)?;
+    let least = LEAST_SQUARE * (trained_with.unit_length() as f32).powi(2);
+    let (points, start) = points(&pairs, region, trained_with.time_interval, settings, cloud, least)?;
     let (span, background) = (trained_with.time_span(), trained_with.background);
     let usual = || usual_time_scale(images.all_views().map(|view| view.time).collect());
     let scale_t = settings.time_scale.unwrap_or_else(usual) as f32 * span;
     let (degree, degree_t) = (settings.degree.min(3), if settings.degree >= 3 { settings.degree_t.min(2) } else { 0 });
     let scene = GaussianScene {
-        form: SceneForm::Trained(trained(&points, scale_t, degree, degree_t)),
+        form: SceneForm::Trained(trained(&points, least, scale_t, degree, degree_t)),
         environment: (rows > 0).then(|| surroundings(background, rows)),
         filter: None,
         trained_with,
@@ -148,12 +149,13 @@ fn points(
     interval: [f32; 2],
     settings: &StartSettings,
     cloud: Option<&PointCloud>,
+    least: f32,
 ) -> Result<(Vec<StartPoint>, Start), StartError> {
     let count = settings.gaussians;
     let mut random = Random::new(settings.seed);
     if settings.start == Start::Points {
         let cloud = cloud.ok_or(StartError::NoPoints)?;
-        return Ok((measured(cloud, interval, count, &mut random), Start::Points));
+        return Ok((measured(cloud, interval, count, least, &mut random), Start::Points));
     }
     let with_gaps = images.iter().filter(|(_, image)| image.has_gaps).count();
     let wants_hull = match settings.start {
@@ -182,7 +184,7 @@ fn points(
         }
     }
     if let Some(cloud) = cloud.filter(|_| settings.start == Start::Auto) {
-        return Ok((measured(cloud, interval, count, &mut random), Start::Points));
+        return Ok((measured(cloud, interval, count, least, &mut random), Start::Points));
     }
     let region = region?;
     let mut point = || StartPoint {
@@ -204,8 +206,8 @@ fn any_time(interval: [f32; 2], random: &mut Random) -> f32 {
 }
 
 /// Returns so many of these points: some of them if there are more, and further ones beside them if there are fewer. Points without times have
-/// any.
-fn measured(cloud: &PointCloud, interval: [f32; 2], count: usize, random: &mut Random) -> Vec<StartPoint> {
+/// any. `least` is the least squared distance of points beside each other.
+fn measured(cloud: &PointCloud, interval: [f32; 2], count: usize, least: f32, random: &mut Random) -> Vec<StartPoint> {
     let PointCloud(own) = cloud;
     let point = |index: usize, beside: Vec3, random: &mut Random| StartPoint {
         position: own[index].position + beside,
@@ -222,7 +224,7 @@ fn measured(cloud: &PointCloud, interval: [f32; 2], count: usize, random: &mut R
         return order[..count].iter().map(|&index| point(index, Vec3::ZERO, random)).collect();
     }
     let places: Vec<[f32; 3]> = own.iter().map(|point| point.position.to_array()).collect();
-    let distances: Vec<f32> = squares(&places).into_iter().map(f32::sqrt).collect();
+    let distances: Vec<f32> = squares(&places, least).into_iter().map(f32::sqrt).collect();
     let further = |index: usize| {
         let beside = if index < own.len() { Vec3::ZERO } else { distances[index % own.len()] * in_cube(random) };
         point(index % own.len(), beside, random)
@@ -231,23 +233,23 @@ fn measured(cloud: &PointCloud, interval: [f32; 2], count: usize, random: &mut R
 }
 
 /// Returns for each place the mean squared distance to the nearest others, at least the least.
-fn squares(places: &[[f32; 3]]) -> Vec<f32> {
+fn squares(places: &[[f32; 3]], least: f32) -> Vec<f32> {
     let near = neighbors(places);
     let square = |(index, own): (usize, &[u32])| {
         let square = |&other: &u32| Vec3::from(places[index]).distance_squared(Vec3::from(places[other as usize]));
-        (own[1..=NEAREST].iter().map(square).sum::<f32>() / NEAREST as f32).max(LEAST_SQUARE)
+        (own[1..=NEAREST].iter().map(square).sum::<f32>() / NEAREST as f32).max(least)
     };
     near.chunks_exact(NEIGHBORS).enumerate().map(square).collect()
 }
 
-/// Returns Gaussians at these points, with this temporal scale.
-fn trained(points: &[StartPoint], scale_t: f32, degree: u32, degree_t: u32) -> Trained {
+/// Returns Gaussians at these points, with at least this squared spatial scale, and with this temporal scale.
+fn trained(points: &[StartPoint], least: f32, scale_t: f32, degree: u32, degree_t: u32) -> Trained {
     let mean: Vec<[f32; 3]> = points.iter().map(|point| point.position.to_array()).collect();
     let count = points.len();
     let unrotated = vec![[1.0, 0.0, 0.0, 0.0]; count];
     let parameters = Parameters {
         mean_t: points.iter().map(|point| point.time).collect(),
-        log_scale: squares(&mean).into_iter().map(|square| [0.5 * square.ln(); 3]).collect(),
+        log_scale: squares(&mean, least).into_iter().map(|square| [0.5 * square.ln(); 3]).collect(),
         log_scale_t: vec![scale_t.ln(); count],
         rotation_l: unrotated.clone(),
         rotation_r: unrotated,
@@ -290,7 +292,7 @@ mod tests {
         let images: Vec<_> = views.iter().map(|(view, image)| (view, image)).collect();
         let region = Region::of(images.iter().map(|(view, _)| *view));
         let settings = StartSettings { gaussians: 700, start, ..StartSettings::default() };
-        points(&images, region, [0.0, 0.8], &settings, cloud)
+        points(&images, region, [0.0, 0.8], &settings, cloud, LEAST_SQUARE)
     }
 
     /// Returns so many points on a line, of one color, at times from 0.2.
@@ -356,7 +358,7 @@ mod tests {
     #[test]
     fn gaussians_begin_as_in_the_original() {
         let (points, _) = start(255, Start::Auto, None).expect("random points");
-        let Trained { parameters, harmonics } = trained(&points, 0.4, 3, 2);
+        let Trained { parameters, harmonics } = trained(&points, LEAST_SQUARE, 0.4, 3, 2);
         let times = parameters.mean_t.iter().copied();
         let [first, last] = [times.clone().fold(f32::MAX, f32::min), times.fold(f32::MIN, f32::max)];
         assert!((-0.08..-0.04).contains(&first) && (0.84..0.88).contains(&last), "a tenth outside: {first} to {last}");

@@ -12,11 +12,11 @@ use crate::offline::dataset::{TrainingView, require_images};
 use crate::offline::fine_tune::{
     FineTuneSettings, FineTuned, Growth, ImageRoom, Rates, Resume, Terms, TrainingImages, require_room,
 };
-use crate::offline::splits::{SplitOptions, Splits};
+use crate::offline::splits::{SplitOptions, Splits, origin_of};
 use crate::offline::store::{Key, Store};
 use crate::offline::{OfflineError, Progress, trained_pixel};
 use crate::renderer::Headless;
-use crate::scene::{PlaybackHints, TrainedWith};
+use crate::scene::{Origin, PlaybackHints, TrainedWith};
 use std::path::{Path, PathBuf};
 
 /// What a capture is trained from, and how.
@@ -68,6 +68,7 @@ impl TrainSettings {
     fn cloud(
         &self,
         named: Option<&Path>,
+        origin: &Origin,
         progress: &mut dyn Progress,
     ) -> Result<(Option<PointCloud>, Key), OfflineError> {
         let none = (None, Key::of(b"no points"));
@@ -81,7 +82,7 @@ impl TrainSettings {
             progress.note(&format!("note: {}: no such file of points, which the dataset names", path.display()));
             return Ok(none);
         }
-        match PointCloud::load(path)? {
+        match PointCloud::load(path, origin)? {
             PointCloud(points) if points.is_empty() && is_asked => {
                 Err(OfflineError::at(path, "has no points with finite places: give another file, or another --start"))
             }
@@ -90,11 +91,41 @@ impl TrainSettings {
         }
     }
 
+    /// Reads the cameras of the dataset and divides them.
+    ///
+    /// # Errors
+    /// Views that cannot be used, images that are missing.
+    pub(crate) fn divide(&self, progress: &mut dyn Progress) -> Result<Divided, OfflineError> {
+        let Self { data, splits: options, capture, .. } = self;
+        let origin = origin_of(data, options, progress)?;
+        // Every time, before the interval is known.
+        let any_time =
+            TrainedWith { time_interval: [f32::NEG_INFINITY, f32::INFINITY], origin, ..TrainedWith::default() };
+        let all = Splits::open(data, options, &any_time, progress)?;
+        let views = all.all_training(&any_time, progress)?;
+        let of_dataset = |error| OfflineError::about(data, error);
+        let capture = CaptureSettings { origin, ..*capture };
+        let (trained_with, playback) = capture_of(&views, &capture, all.clock).map_err(of_dataset)?;
+        let splits = Splits::open(data, options, &trained_with, progress)?;
+        require_images(&splits.train)?;
+        Ok(Divided { splits, views, trained_with, playback })
+    }
+
     /// Returns the usual settings for a dataset.
     pub fn usual(data: PathBuf, splits: SplitOptions) -> Self {
         let (capture, start) = (CaptureSettings::default(), StartSettings::default());
         Self { data, splits, capture, start, points: None, tuning: Self::tuning(Self::STEPS), save_every: 5000 }
     }
+}
+
+/// The views of a dataset, divided, and the capture that is trained on them: what is known before an image is read.
+#[derive(Debug)]
+pub(crate) struct Divided {
+    pub splits: Splits,
+    /// Every training view, including the validation views.
+    pub views: Vec<TrainingView>,
+    pub trained_with: TrainedWith,
+    pub playback: PlaybackHints,
 }
 
 /// A training whose views are read.
@@ -134,17 +165,10 @@ impl<'a> Training<'a> {
     /// # Errors
     /// Views, images or points that are missing or cannot be used.
     pub fn open(settings: &'a TrainSettings, progress: &mut dyn Progress) -> Result<Self, OfflineError> {
-        let TrainSettings { data, splits: options, capture, start, tuning, .. } = settings;
-        // Every time, before the interval is known.
-        let any_time = TrainedWith { time_interval: [f32::NEG_INFINITY, f32::INFINITY], ..TrainedWith::default() };
-        let all = Splits::open(data, options, &any_time, progress)?;
-        let views = all.all_training(&any_time, progress)?;
-        let of_dataset = |error| OfflineError::about(data, error);
-        let (mut trained_with, playback) = capture_of(&views, capture, all.clock).map_err(of_dataset)?;
-        let splits = Splits::open(data, options, &trained_with, progress)?;
+        let TrainSettings { start, tuning, .. } = settings;
+        let Divided { splits, views, mut trained_with, playback } = settings.divide(progress)?;
         trained_with.validation = Some(splits.to_string());
-        require_images(&splits.train)?;
-        let (cloud, of_cloud) = settings.cloud(splits.points.as_deref(), progress)?;
+        let (cloud, of_cloud) = settings.cloud(splits.points.as_deref(), &trained_with.origin, progress)?;
         let key = Key::of_images(&splits.train, progress)?
             .with(of_cloud)
             .with(Key::of_images(&splits.validation, progress)?)
@@ -152,6 +176,11 @@ impl<'a> Training<'a> {
             .and(&format!("{:?} {:?}", splits.train, splits.validation))
             .and(env!("CARGO_PKG_VERSION"));
         Ok(Self { settings, splits, views, trained_with, playback, cloud, key })
+    }
+
+    /// Returns the views by purpose.
+    pub fn splits(&self) -> &Splits {
+        &self.splits
     }
 
     /// Returns the key of everything that the result depends on: images, cameras, settings, version.
