@@ -4,6 +4,7 @@
 
 use super::checkpoint::CheckpointError;
 use super::import::ImportError;
+use super::options::InvalidOption;
 use super::package::PackageError;
 use crate::gaussian::InvalidGaussian;
 use std::io;
@@ -40,4 +41,16 @@ pub enum CodecErrorKind {
     /// A Gaussian that cannot be drawn.
     #[error(transparent)]
     Gaussian(#[from] InvalidGaussian),
+}
+
+impl CodecErrorKind {
+    /// Returns the option that is refused, if one is.
+    pub fn invalid_option(&self) -> Option<&InvalidOption> {
+        match self {
+            Self::Checkpoint(CheckpointError::Option(option))
+            | Self::Package(PackageError::Option(option))
+            | Self::Import(ImportError::Option(option)) => Some(option),
+            _ => None,
+        }
+    }
 }

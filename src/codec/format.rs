@@ -6,14 +6,15 @@
 use super::checkpoint;
 use super::error::CodecErrorKind;
 use super::fourdgs;
-use super::import::source::Source;
-use super::import::{ImportError, Imported, gltf, npz, ply, sequence, sog, splat, splatv, spz};
+use super::import::source::{Beside, Source};
+use super::import::{ImportError, Imported, gltf, ksplat, npz, ply, sequence, sog, splat, splatv, spz};
+use super::input::Input;
+use super::looks;
 use super::options::ReadOptions;
 use super::package::{self, PackageInfo, WriteSettings};
 use super::start::{Start, ZIP};
 use crate::scene::GaussianScene;
-use std::fs::File;
-use std::io::{BufReader, Write};
+use std::io::Write;
 use std::path::Path;
 
 /// A file format: a row of the table.
@@ -33,14 +34,14 @@ pub struct Format {
     pub write: Option<fn(&mut dyn Write, &GaussianScene, &WriteSettings) -> Result<(), CodecErrorKind>>,
     /// Verifies the checksums of a file without building the scene, and returns its header and the damaged sections;
     /// `None` if the files of the format have no sections.
-    pub inspect: Option<fn(BufReader<File>) -> Result<PackageInfo, CodecErrorKind>>,
+    pub(crate) inspect: Option<fn(Input) -> Result<PackageInfo, CodecErrorKind>>,
 }
 
 /// How a format is read.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Read {
-    /// From the file at a path, which is open and positioned at its start.
-    File(fn(&Path, BufReader<File>, &ReadOptions) -> Result<GaussianScene, CodecErrorKind>),
+    /// From a file that is positioned at its start and has this path, and the other files of its folder.
+    File(fn(Input, &Path, &dyn Beside, &ReadOptions) -> Result<Imported, CodecErrorKind>),
     /// From its bytes in memory.
     Bytes(fn(&Source<'_>, &ReadOptions) -> Result<Imported, ImportError>),
     /// From the files of the folder at a path.
@@ -51,7 +52,7 @@ pub(crate) enum Read {
 pub const FORMATS: &[Format] = &[
     Format {
         id: "checkpoint",
-        name: "a checkpoint of the 4DGS trainer (.pth, a zip archive)",
+        name: "a checkpoint of the 4DGS trainer, gsplat or nerfstudio (.pth, .pt, .ckpt)",
         extensions: checkpoint::EXTENSIONS,
         is_of: is_checkpoint,
         read: Read::File(read_checkpoint),
@@ -139,12 +140,21 @@ pub const FORMATS: &[Format] = &[
         write: None,
         inspect: None,
     },
-    // The last row: nothing in such a file tells its format.
+    Format {
+        id: "ksplat",
+        name: "a capture of the player GaussianSplats3D (.ksplat)",
+        extensions: ksplat::EXTENSIONS,
+        is_of: ksplat::is_of,
+        read: Read::Bytes(ksplat::read),
+        write: None,
+        inspect: None,
+    },
+    // The last row: such a file has no header, so that its numbers alone tell its format.
     Format {
         id: "splat",
         name: "a .splat file (.splat)",
-        extensions: &["splat"],
-        is_of: |start| start.extension == "splat" && !start.bytes.is_empty(),
+        extensions: splat::EXTENSIONS,
+        is_of: splat::is_of,
         read: Read::Bytes(splat::read),
         write: None,
         inspect: None,
@@ -174,37 +184,47 @@ pub fn imported_extensions() -> Vec<&'static str> {
     extensions
 }
 
-/// Returns the message about a file of no known format.
-pub(super) fn unknown() -> String {
+/// Returns the message about a file of no known format, with what it looks like.
+pub(super) fn unknown(start: &Start) -> String {
     let names: Vec<&str> = FORMATS.iter().map(|format| format.name).collect();
+    let looks = looks::described(start);
     match names.split_last() {
-        Some((last, others)) => format!("neither {} nor {last}", others.join(", ")),
-        None => "of no known format".to_owned(),
+        Some((last, others)) => format!("neither {} nor {last}: {looks}", others.join(", ")),
+        None => looks,
     }
 }
 
 /// Returns the message about a folder of no known format.
 pub(super) fn unknown_folder() -> String {
-    format!("is a folder, but not of a sequence: {}", sequence::NAMES)
+    format!(
+        "is a folder, but neither of a sequence ({}) nor of a SOG (meta.json or lod-meta.json beside its textures)",
+        sequence::NAMES
+    )
 }
 
 /// Returns whether a file is a checkpoint: a zip archive that has the pickle of a trainer, or that is damaged, so that its error is that of
-/// the most frequent archive.
+/// the most frequent archive; or a file of torch before version 1.6.
 fn is_checkpoint(start: &Start) -> bool {
     let has_pickle = start.entries.iter().any(|entry| entry.ends_with("data.pkl"));
-    start.bytes.starts_with(ZIP) && (start.entries.is_empty() || has_pickle)
+    let is_archive = start.bytes.starts_with(ZIP) && (start.entries.is_empty() || has_pickle);
+    is_archive || checkpoint::is_legacy(&start.bytes)
 }
 
 fn is_package(start: &Start) -> bool {
     start.bytes.starts_with(&package::MAGIC)
 }
 
-fn read_checkpoint(path: &Path, file: BufReader<File>, options: &ReadOptions) -> Result<GaussianScene, CodecErrorKind> {
-    Ok(checkpoint::read_file(path, file, options)?)
+fn read_checkpoint(
+    file: Input,
+    path: &Path,
+    beside: &dyn Beside,
+    options: &ReadOptions,
+) -> Result<Imported, CodecErrorKind> {
+    Ok(checkpoint::read_file(file, path, beside, options)?)
 }
 
-fn read_package(_: &Path, file: BufReader<File>, options: &ReadOptions) -> Result<GaussianScene, CodecErrorKind> {
-    Ok(package::read_with(file, options)?)
+fn read_package(file: Input, _: &Path, _: &dyn Beside, options: &ReadOptions) -> Result<Imported, CodecErrorKind> {
+    Ok(Imported { scene: package::read_with(file, options)?, lost: Vec::new() })
 }
 
 fn write_package(
@@ -215,7 +235,7 @@ fn write_package(
     Ok(package::write(writer, scene, settings)?)
 }
 
-fn inspect_package(file: BufReader<File>) -> Result<PackageInfo, CodecErrorKind> {
+fn inspect_package(file: Input) -> Result<PackageInfo, CodecErrorKind> {
     Ok(package::inspect(file)?)
 }
 
@@ -224,12 +244,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_message_about_an_unknown_format_names_every_format() {
-        let expected = "neither a checkpoint of the 4DGS trainer (.pth, a zip archive), a package (.gs4d), an SPZ file (.spz), \
-                        a capture of the player splaTV (.splatv), a SOG (.sog, .sogst, .sog4d, .tsog, or the meta.json or lod-meta.json \
-                        of one), a capture of the 4dgs format (.4dgs), parameters of Dynamic 3D Gaussians (.npz), a PLY of Gaussians \
-                        (.ply), a folder of numbered PLY files, a glTF file with Gaussians (.glb or .gltf) nor a .splat file (.splat)";
-        assert_eq!(unknown(), expected, "every format by name and extension");
+    fn the_message_about_an_unknown_format_names_every_format_and_what_it_is() {
+        let expected = "neither a checkpoint of the 4DGS trainer, gsplat or nerfstudio (.pth, .pt, .ckpt), a package (.gs4d), \
+                        an SPZ file (.spz), a capture of the player splaTV (.splatv), a SOG (.sog, .sogst, .sog4d, .tsog, or the \
+                        meta.json or lod-meta.json of one), a capture of the 4dgs format (.4dgs), parameters of Dynamic 3D Gaussians \
+                        (.npz), a PLY of Gaussians (.ply), a folder of numbered PLY files, a glTF file with Gaussians (.glb or .gltf), \
+                        a capture of the player GaussianSplats3D (.ksplat) nor a .splat file (.splat): it is empty";
+        assert_eq!(unknown(&Start::default()), expected, "every format by name and extension");
     }
 
     #[test]

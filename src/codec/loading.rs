@@ -1,15 +1,14 @@
 //! A file in memory that is read in steps, for programs that must go on meanwhile, as a page in a browser.
 //!
 //! In: the name and the bytes of a file, and [`ReadOptions`]. Out: after some steps, a [`GaussianScene`]; after some more, a [`RuntimeScene`]. Packages are
-//! read in small steps, files of other makes in one; all are converted in small steps.
+//! read in small steps, checkpoints and files of other makes in one; all are converted in small steps.
 
 use super::error::{CodecError, CodecErrorKind};
-use super::format::{self, Format, Read};
-use super::import::source::{InMemory, Source};
-use super::import::{ImportError, Imported};
+use super::found::Found;
+use super::import::source::InMemory;
+use super::input::Input;
 use super::options::ReadOptions;
 use super::package::{self, PackageError, Reading};
-use super::start::Start;
 use crate::scene::{Conversion, GaussianScene, RuntimeScene};
 use std::io::{self, Cursor};
 use std::path::{Path, PathBuf};
@@ -39,16 +38,14 @@ pub struct Loading {
 
 enum State {
     Package(Box<Reading<Cursor<Vec<u8>>>>),
-    /// A file of another make, and how it is read.
-    Other(Vec<u8>, ReadBytes),
+    /// A file of another make, or inside of another file.
+    Other(Box<Found<'static>>),
     /// Its scene.
     Read(Box<GaussianScene>),
     Converting(Box<Conversion>),
     /// A step has failed.
     Failed,
 }
-
-type ReadBytes = fn(&Source<'_>, &ReadOptions) -> Result<Imported, ImportError>;
 
 impl Loading {
     /// Recognizes the format of a file by its contents, or by the extension of its name, and reads the header of a package.
@@ -66,17 +63,21 @@ impl Loading {
     /// # Errors
     /// As [`load`](super::load).
     pub fn advance(&mut self, bytes: usize) -> Result<bool, CodecError> {
-        let mut advance = || match &mut self.state {
-            State::Package(reading) => Ok(reading.advance(bytes)?),
-            State::Other(bytes, read) => {
-                let source = Source { bytes, beside: &InMemory::default() };
-                self.state = State::Read(Box::new(read(&source, &self.options)?.scene));
-                Ok(true)
-            }
+        let advanced = match &mut self.state {
+            State::Package(reading) => reading.advance(bytes).map_err(CodecErrorKind::from),
+            State::Other(_) => self.read_other().map(|()| true),
             State::Read(_) | State::Converting(_) => Ok(false),
             State::Failed => Err(failed()),
         };
-        advance().map_err(|kind| CodecError { path: self.path.clone(), kind })
+        advanced.map_err(|kind| CodecError { path: self.path.clone(), kind })
+    }
+
+    /// Reads a file of another make.
+    fn read_other(&mut self) -> Result<(), CodecErrorKind> {
+        if let State::Other(found) = std::mem::replace(&mut self.state, State::Failed) {
+            self.state = State::Read(Box::new(found.read(&self.options)?.scene));
+        }
+        Ok(())
     }
 
     /// Does one step towards a scene that can be drawn: as [`advance`](Self::advance), then as [`GaussianScene::into_runtime`], about `bytes` at most.
@@ -106,7 +107,7 @@ impl Loading {
     pub fn progress(&self) -> f32 {
         match &self.state {
             State::Package(reading) => reading.progress(),
-            State::Other(..) => 0.0,
+            State::Other(_) => 0.0,
             State::Read(_) | State::Converting(_) | State::Failed => 1.0,
         }
     }
@@ -144,10 +145,7 @@ impl State {
             options.check().map_err(PackageError::from)?;
             return Ok(Self::Package(Box::new(Reading::new(Cursor::new(bytes))?)));
         }
-        match Format::of(&Start::of(&mut Cursor::new(&bytes), path)?).map(|format| format.read) {
-            Some(Read::Bytes(read)) => Ok(Self::Other(bytes, read)),
-            Some(Read::File(_) | Read::Folder(_)) | None => Err(CodecErrorKind::UnknownFormat(format::unknown())),
-        }
+        Ok(Self::Other(Box::new(Found::of(Input::of(bytes), path, Box::new(InMemory::default()))?)))
     }
 
     /// Returns the scene, once it has been read.
@@ -156,7 +154,7 @@ impl State {
             Self::Package(reading) => Ok(reading.finish_with(options)?),
             Self::Read(scene) => Ok(*scene),
             Self::Converting(conversion) => Ok(conversion.finish()?.into()),
-            Self::Other(..) | Self::Failed => Err(failed()),
+            Self::Other(_) | Self::Failed => Err(failed()),
         }
     }
 }

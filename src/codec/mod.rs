@@ -1,16 +1,24 @@
 //! Files and scenes.
 //!
 //! In: a path, and [`ReadOptions`] for settings that the file may not contain. Out: a [`GaussianScene`]; and back.
-//! `format` is the table of formats: [`checkpoint`] reads the files of the 4DGS trainer (`.pth`),
-//! [`package`] reads and writes the format of this crate (`.gs4d`), `import` reads those of other makes.
+//! `format` is the table of formats: [`checkpoint`] reads the files of the 4DGS trainer (`.pth`), of gsplat and of nerfstudio,
+//! [`package`] reads and writes the format of this crate (`.gs4d`), `import` reads those of other makes. `found` finds the capture of a
+//! file, which may be inside of gzip or of a zip archive; `looks` says what a file is that is no capture.
 
+pub(crate) mod budget;
 pub mod checkpoint;
 mod error;
 pub(crate) mod export;
 pub(crate) mod format;
+mod found;
 mod fourdgs;
+pub(crate) mod hidden;
 pub(crate) mod import;
+mod in_archive;
+pub(crate) mod input;
+pub(crate) mod json;
 mod loading;
+pub(crate) mod looks;
 pub(crate) mod npy;
 pub(crate) mod options;
 pub mod package;
@@ -27,17 +35,27 @@ use crate::scene::GaussianScene;
 use format::FORMATS;
 pub use format::Format;
 use format::Read;
+use found::Found;
 use import::Imported;
-use import::sequence;
-use import::source::{Beside, InFolder, Source};
+use import::source::{Beside, InFolder, InMemory, Source};
+use import::{sequence, sog};
+use input::Input;
 use package::{PackageInfo, WriteSettings};
 use start::Start;
-use std::fs::File;
-use std::io::{BufReader, Cursor, Read as _, Write};
+use std::io::{Cursor, Write};
 use std::path::Path;
 
-/// Reads a capture: a file, or the folder of a sequence of files. Its format follows from the contents of the file, not from its name, unless
-/// nothing in the file tells it. The format interprets the options; see [`ReadOptions`].
+/// A path that has been looked at.
+enum Opened<'p> {
+    /// The folder of a format that is read from folders.
+    Folder(Format),
+    /// A file, or the file of a folder that stands for all.
+    File(Found<'p>),
+}
+
+/// Reads a capture: a file, the folder of a sequence of files, or that of a SOG. Its format follows from the contents of the file, not from its
+/// name, unless nothing in the file tells it. A file in gzip is unpacked, and of a zip archive its only capture is read. The format interprets the
+/// options; see [`ReadOptions`].
 ///
 /// # Errors
 /// A file that cannot be opened, is of an unknown format, or is damaged; options that are invalid or contradict the
@@ -51,19 +69,10 @@ pub fn load(path: &Path, options: &ReadOptions) -> Result<GaussianScene, CodecEr
 /// # Errors
 /// As [`load`].
 pub(crate) fn load_stating(path: &Path, options: &ReadOptions) -> Result<Imported, CodecError> {
-    let read = || {
-        let (format, file) = open(path)?;
-        match (format.read, file) {
-            (Read::File(read), Some(file)) => Ok(Imported { scene: read(path, file, options)?, lost: Vec::new() }),
-            (Read::Bytes(read), Some(mut file)) => {
-                let mut bytes = Vec::new();
-                file.read_to_end(&mut bytes)?;
-                let folder = path.parent().unwrap_or(Path::new(""));
-                Ok(read(&Source { bytes: &bytes, beside: &InFolder(folder) }, options)?)
-            }
-            (Read::Folder(read), _) => Ok(read(path, options)?),
-            (Read::File(_) | Read::Bytes(_), None) => Err(CodecErrorKind::UnknownFormat(format::unknown_folder())),
-        }
+    let read = || match open(path)? {
+        Opened::File(found) => found.read(options),
+        Opened::Folder(Format { read: Read::Folder(read), .. }) => Ok(read(path, options)?),
+        Opened::Folder(_) => Err(CodecErrorKind::UnknownFormat(format::unknown_folder())),
     };
     read().map_err(|kind| CodecError { path: path.to_owned(), kind })
 }
@@ -71,7 +80,7 @@ pub(crate) fn load_stating(path: &Path, options: &ReadOptions) -> Result<Importe
 /// Reads a capture of another make from bytes in memory.
 ///
 /// # Errors
-/// Bytes of an unknown format, or of one that is read from files alone; as [`load`].
+/// Bytes of an unknown format; as [`load`].
 pub(crate) fn read_bytes(
     path: &Path,
     bytes: &[u8],
@@ -81,7 +90,10 @@ pub(crate) fn read_bytes(
     let start = Start::of(&mut Cursor::new(bytes), path)?;
     match Format::of(&start).map(|format| format.read) {
         Some(Read::Bytes(read)) => Ok(read(&Source { bytes, beside }, options)?),
-        Some(Read::File(_) | Read::Folder(_)) | None => Err(CodecErrorKind::UnknownFormat(format::unknown())),
+        Some(Read::File(read)) => read(Input::of(bytes.to_vec()), path, beside, options),
+        Some(Read::Folder(_)) | None => {
+            Found::of(Input::of(bytes.to_vec()), path, Box::new(InMemory::default()))?.read(options)
+        }
     }
 }
 
@@ -100,23 +112,30 @@ pub(crate) fn read_frames(frames: Vec<(String, Vec<u8>)>, options: &ReadOptions)
 /// # Errors
 /// A file that cannot be opened, is of an unknown format, or has a damaged header.
 pub fn inspect(path: &Path) -> Result<(Format, Option<PackageInfo>), CodecError> {
-    let inspect = || {
-        let (format, file) = open(path)?;
-        Ok((format, format.inspect.zip(file).map(|(inspect, file)| inspect(file)).transpose()?))
+    let inspect = || match open(path)? {
+        Opened::Folder(format) => Ok((format, None)),
+        Opened::File(Found { format, input, .. }) => {
+            Ok((format, format.inspect.map(|inspect| inspect(input)).transpose()?))
+        }
     };
     inspect().map_err(|kind| CodecError { path: path.to_owned(), kind })
 }
 
-/// Returns the format of a file, and the file at its start; of a folder the format alone.
-fn open(path: &Path) -> Result<(Format, Option<BufReader<File>>), CodecErrorKind> {
-    if path.is_dir() {
-        let format = Format::of(&Start::of_folder(path)?);
-        return Ok((format.ok_or_else(|| CodecErrorKind::UnknownFormat(format::unknown_folder()))?, None));
+/// Returns the file at a path, or the format of the folder there.
+fn open(path: &Path) -> Result<Opened<'_>, CodecErrorKind> {
+    if !path.is_dir() {
+        let folder = path.parent().unwrap_or(Path::new(""));
+        return Ok(Opened::File(Found::of(Input::open(path)?, path, Box::new(InFolder(folder)))?));
     }
-    let mut file = BufReader::new(File::open(path)?);
-    let start = Start::of(&mut file, path)?;
-    let format = Format::of(&start).ok_or_else(|| CodecErrorKind::UnknownFormat(format::unknown()))?;
-    Ok((format, Some(file)))
+    let start = Start::of_folder(path)?;
+    if let Some(main) = sog::main_file(&start).map(|name| path.join(name)) {
+        let mut input = Input::open(&main)?;
+        if sog::is_of(&Start::of(&mut input, &main)?) {
+            return Ok(Opened::File(Found::of(input, &main, Box::new(InFolder(path)))?));
+        }
+    }
+    let format = Format::of(&start).ok_or_else(|| CodecErrorKind::UnknownFormat(format::unknown_folder()))?;
+    Ok(Opened::Folder(format))
 }
 
 /// Writes a scene in the format that the extension of `path` names; as a package if there is no such format or it
@@ -143,12 +162,16 @@ mod tests {
     #[test]
     fn a_file_of_an_unknown_format_is_refused_with_the_known_formats() {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        for (name, text) in [("empty.gs4d", ""), ("short.pth", "PK"), ("points.obj", "v 0 0 0\n")] {
+        for (name, text, looks) in [
+            ("empty.gs4d", "", "it is empty"),
+            ("short.pth", "PK", "it is text that begins with PK"),
+            ("points.obj", "v 0 0 0\n", "it is text that begins with v 0 0 0"),
+        ] {
             let path = folder.path().join(name);
             std::fs::write(&path, text).expect("the folder can be written to");
             let message = load(&path, &ReadOptions::default()).expect_err("not a capture").to_string();
-            let is_complete = [name, ".pth", ".gs4d"].iter().all(|part| message.contains(part));
-            assert!(is_complete, "the message names the file and the known formats: {message}");
+            let is_complete = [name, ".pth", ".gs4d", looks].iter().all(|part| message.contains(part));
+            assert!(is_complete, "the message names the file, the known formats and what it is: {message}");
         }
     }
 }

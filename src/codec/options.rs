@@ -27,7 +27,8 @@ pub struct ReadOptions {
     /// Convention of the rotations in the file. Default: flipped, unless the file is certainly unflipped (all
     /// coefficients of the time blocks zero at time degree 2).
     pub rotation_convention: Option<RotationConvention>,
-    /// Field of view that shaped the footprints. Default: reference.
+    /// Field of view that shaped the footprints. Default: reference, the placeholder of the original trainer, for its checkpoints; corrected, the
+    /// true one, for files of other makes.
     pub raster_fov: Option<RasterFov>,
     /// Kind of cameras that took the training views. Default: intrinsics if there is an environment map, else field of
     /// view.
@@ -38,16 +39,16 @@ pub struct ReadOptions {
     pub force_sh_3d: Option<bool>,
     /// Added to the temporal variance in the marginal, if positive. Default: the value in `cfg_args`, else −1.
     pub prefilter_var: Option<f32>,
-    /// The axis that points up. Default: +Z.
+    /// The axis that points up. Default: +Z for checkpoints; for files of other makes that of the file or its format, −Y for PLY without a comment about it.
     pub up: Option<UpAxis>,
     /// Seconds of one pass through the time interval; 0 for a still. Default: the length of the interval, as if its unit
     /// were the second.
     pub duration_seconds: Option<f32>,
     /// The marginal at and below which a Gaussian is not drawn, from 1/255 to below 1. Default: what the format has; 0.05 for checkpoints.
     pub marginal_cutoff: Option<f32>,
-    /// Frames a second of a sequence of files. Default: 30.
+    /// Frames a second of a sequence of files, whose numbers count frames, and of the frames of motion in a PLY. Default: 30.
     pub fps: Option<f32>,
-    /// Whether the file is the first of several with numbered names, which are the frames of a sequence. Default: `false`.
+    /// Whether the file is the first of several with consecutive numbers in their names, which are the frames of a sequence. Default: `false`.
     pub sequence: bool,
     /// Largest distance between a curved path and the straight pieces that replace it, relative to the middle scale of the Gaussian.
     /// Default: 0.25.
@@ -58,7 +59,7 @@ pub struct ReadOptions {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("option {name}: {reason}")]
 pub struct InvalidOption {
-    /// Name of the option.
+    /// Name of the field of [`ReadOptions`].
     pub name: &'static str,
     /// Why its value is refused.
     pub reason: String,
@@ -74,7 +75,7 @@ impl ReadOptions {
         if let Some([first, last]) = self.time_interval
             && !(first.is_finite() && last > first && (last - first).is_finite())
         {
-            return refuse("time interval", format!("{first},{last} is not a first and a later last timestamp"));
+            return refuse("time_interval", format!("{first},{last} is not a first and a later last timestamp"));
         }
         if let Some(color) = self.background
             && !color.iter().all(|channel| channel.is_finite())
@@ -84,17 +85,17 @@ impl ReadOptions {
         if let Some(variance) = self.prefilter_var
             && !variance.is_finite()
         {
-            return refuse("prefilter variance", format!("{variance} is not finite"));
+            return refuse("prefilter_var", format!("{variance} is not finite"));
         }
         if let Some(seconds) = self.duration_seconds
             && !(seconds.is_finite() && seconds >= 0.0)
         {
-            return refuse("duration", format!("{seconds} is not a number of seconds, zero or above"));
+            return refuse("duration_seconds", format!("{seconds} is not a number of seconds, zero or above"));
         }
         if let Some(cutoff) = self.marginal_cutoff
             && !(SMALLEST_CUTOFF..1.0).contains(&cutoff)
         {
-            return refuse("marginal cut-off", format!("{cutoff} is not from 1/255 to below 1"));
+            return refuse("marginal_cutoff", format!("{cutoff} is not from 1/255 to below 1"));
         }
         if let Some(fps) = self.fps
             && !(fps.is_finite() && fps > 0.0)

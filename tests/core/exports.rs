@@ -4,11 +4,13 @@
 
 use bevy_gs4d::codec::{ReadOptions, load};
 use bevy_gs4d::gaussian::{Gaussian, Harmonics};
-use bevy_gs4d::internal::codec::export::{Export, Exporter};
+use bevy_gs4d::internal::codec::export::{EXPORTS, Export, Exporter};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{
-    ActiveSets, FilterKind, Form, GaussianScene, RuntimeScene, SceneForm, Sliced, TemporalFilter, Trained, UpAxis,
+    ActiveSets, FilterKind, Form, GaussianScene, Origin, RuntimeScene, SceneForm, Sliced, TemporalFilter, Trained,
+    TrainedWith, UpAxis,
 };
+use bevy_gs4d::view::RasterFov;
 use glam::Vec3;
 use std::fs;
 use std::path::Path;
@@ -228,5 +230,112 @@ fn splat_files_come_back_within_their_steps() {
         fs::write(&path, vec![0; length]).expect("the folder can be written to");
         let message = load(&path, &ReadOptions::default()).expect_err("no .splat file").to_string();
         assert!(message.contains(reason), "{length} bytes: {message}");
+    }
+}
+
+#[test]
+fn imports_of_every_format_have_the_true_field_of_view() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mut scene = moving();
+    scene.trained_with.raster_fov = RasterFov::Reference;
+    let mut read = Vec::new();
+    for format in EXPORTS {
+        let path = folder.path().join(format!("it.{}", format.extension));
+        let mut bytes = Vec::new();
+        // The feature of a format may be off.
+        if exporter(&scene, format.id).write(0.4, &mut bytes).is_err() {
+            continue;
+        }
+        fs::write(&path, bytes).expect("the folder can be written to");
+        let Ok(found) = load(&path, &ReadOptions::default()) else { continue };
+        assert_eq!(found.trained_with.raster_fov, RasterFov::Corrected, "{}: the true one", format.name);
+        let options = ReadOptions { raster_fov: Some(RasterFov::Reference), ..ReadOptions::default() };
+        let found = load(&path, &options).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(found.trained_with.raster_fov, RasterFov::Reference, "{}: the option", format.name);
+        read.push(format.id);
+    }
+    assert!(["ply", "gltf", "spz", "sog"].iter().all(|id| read.contains(id)), "these are read: {read:?}");
+}
+
+#[test]
+fn the_axis_that_points_up_comes_back() {
+    let mut scene = resting(1);
+    for up in [UpAxis::PosZ, UpAxis::NegX, UpAxis::NegY] {
+        scene.playback.up = up;
+        for id in ["ply", "free-time"] {
+            let found = again(&scene, id, 0.0);
+            assert_eq!(found.playback.up, up, "{id}: the comment says it");
+            let means = |scene: &GaussianScene| sliced(scene).0.iter().map(|one| one.mean).collect::<Vec<_>>();
+            assert_eq!(means(&found), means(&scene), "{id}: the coordinates stay");
+            let said = exporter(&scene, id).lost().iter().any(|sentence| sentence.contains("points up"));
+            assert_eq!(said, up != UpAxis::NegY, "{id}: an axis that other programs do not expect is stated");
+        }
+        // A .splat file has no comments: -y points up.
+        let (found, expected) = (again(&scene, "splat", 0.0), sliced(&scene).0);
+        assert_eq!(found.playback.up, UpAxis::NegY, "the axis of the format");
+        let heights = sliced(&found).0.iter().map(|one| -one.mean[1]).collect::<Vec<_>>();
+        let expected: Vec<f32> = expected.iter().map(|one| up.vector().dot(Vec3::from(one.mean))).collect();
+        assert_eq!(heights, expected, "{up:?}: the height of each Gaussian stays");
+    }
+}
+
+#[test]
+fn places_of_the_files_come_back_with_their_digits() {
+    let mut scene = moving();
+    scene.form.truncate_colors(3, 0);
+    scene.trained_with.origin = Origin { place: [500_000.0, 5_400_001.0, -310.5], time: 1.7e9 };
+    let lost = |id: &str| exporter(&scene, id).lost().join("\n");
+    for (id, time) in [("ply", 0.4), ("free-time", 0.0)] {
+        let written = bytes(&exporter(&scene, id), time);
+        assert!(written.windows(18).any(|window| window == b"property double x\n"), "{id}: double precision");
+        let found = again(&scene, id, time);
+        assert_eq!(found.trained_with.origin.place, scene.trained_with.origin.place, "{id}: the origin");
+        let without = GaussianScene {
+            trained_with: TrainedWith { origin: Origin::default(), ..scene.trained_with.clone() },
+            ..scene.clone()
+        };
+        let expected = again(&without, id, time);
+        for (found, expected) in sliced(&found).0.iter().zip(sliced(&expected).0) {
+            let is_near = Vec3::from(found.mean).abs_diff_eq(Vec3::from(expected.mean), 1e-8);
+            assert!(is_near, "{id}: {:?} is {:?}", found.mean, expected.mean);
+        }
+        assert!(!lost(id).contains("origin"), "{id}: no place is lost: {}", lost(id));
+    }
+    assert!(lost("free-time").contains("1700000000"), "a time that is left out is stated: {}", lost("free-time"));
+    for id in ["gltf", "spz", "sog", "splat", "usd"] {
+        assert!(lost(id).contains("(500000, 5400001, -310.5)"), "{id} has no origin: {}", lost(id));
+    }
+}
+
+#[test]
+fn gaussians_too_far_for_spz_are_left_out_and_counted() {
+    let mut scene = resting(0);
+    (scene.playback.up, scene.playback.duration_seconds) = (UpAxis::PosY, 0.0);
+    let SceneForm::Trained(Trained { parameters, .. }) = &mut scene.form else { panic!("the trained form") };
+    (parameters.mean[7], parameters.mean[8]) = ([0.0, 1e9, 0.0], [-1e6, 0.0, 0.0]);
+    let exporter = exporter(&scene, "spz");
+    let is_stated = exporter.lost().iter().any(|sentence| sentence.starts_with("2 of 400 Gaussians are left out"));
+    assert!(is_stated, "their number is known before the file is written: {:?}", exporter.lost());
+    assert_eq!(exporter.write(0.0, &mut Vec::new()).expect("memory can be written to"), 398, "the others are written");
+    let (found, mut expected) = (sliced(&again(&scene, "spz", 0.0)).0, sliced(&scene).0);
+    expected.drain(7..9);
+    assert_eq!(found.len(), expected.len(), "the others are in the file");
+    for (found, expected) in found.iter().zip(&expected) {
+        let apart = Vec3::from(found.mean).distance(Vec3::from(expected.mean));
+        assert!(apart < 2e-5, "the others keep their digits: {:?} is {:?}", found.mean, expected.mean);
+    }
+}
+
+#[test]
+fn the_filter_of_mip_splatting_comes_back_or_is_stated() {
+    let mut scene = resting(0);
+    for mip_filter in [false, true] {
+        scene.trained_with.mip_filter = mip_filter;
+        for id in ["spz", "ply", "splat", "gltf"] {
+            let is_stated = exporter(&scene, id).lost().iter().any(|sentence| sentence.contains("Mip-Splatting"));
+            assert_eq!(is_stated, mip_filter && id != "spz", "{id}: whether it is lost");
+            let found = again(&scene, id, 0.0).trained_with.mip_filter;
+            assert_eq!(found, mip_filter && id == "spz", "{id}: whether the file has it");
+        }
     }
 }

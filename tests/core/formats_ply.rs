@@ -1,11 +1,16 @@
 //! PLY and `.splat` files of other makes.
 //!
-//! In: the folder `formats` of the data that `GS4D_DATA` names. Out: proof that each file has the values that an independent reader finds.
+//! In: the folder `formats` of the data that `GS4D_DATA` names. Out: proof that each file has the values that an independent reader finds; and, of a
+//! file that the test makes, that a sphere is drawn round.
 
 use crate::support::data::data;
 use bevy_gs4d::codec::{ReadOptions, load};
 use bevy_gs4d::gaussian::{Gaussian, Harmonics};
+use bevy_gs4d::reference;
 use bevy_gs4d::scene::{Form, GaussianScene, RuntimeScene, SceneForm};
+use bevy_gs4d::view::{Camera, Lens, Picture, RasterFov};
+use glam::{UVec2, Vec2, Vec3};
+use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The factor of the coefficient of degree 0.
@@ -163,4 +168,46 @@ fn moving_ply_has_the_values_of_an_independent_reader() {
     assert_near(found.velocity, [0.5937, 0.93339, 0.46199], 5e-4, "velocity");
     assert_near([found.mean_t], [2.66], 0.01, "temporal mean");
     assert_near([found.sigma_t / 0.1648], [1.0], 0.02, "temporal deviation");
+}
+
+/// Returns the standard deviations of a picture across and down, pixels.
+fn deviations(picture: &Picture) -> [f64; 2] {
+    let UVec2 { x: width, y: height } = picture.size;
+    let weighted = |value: &dyn Fn(f64, f64) -> f64| -> f64 {
+        let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+        pixels.map(|(x, y)| f64::from(picture.pixel(x, y).y) * value(f64::from(x), f64::from(y))).sum()
+    };
+    let sum = weighted(&|_, _| 1.0);
+    let (x, y) = (weighted(&|x, _| x) / sum, weighted(&|_, y| y) / sum);
+    [weighted(&|at, _| (at - x).powi(2)), weighted(&|_, at| (at - y).powi(2))].map(|square| (square / sum).sqrt())
+}
+
+#[test]
+fn a_sphere_is_round_for_cameras_with_intrinsics() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let names = "x y z f_dc_0 f_dc_1 f_dc_2 opacity scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3";
+    let properties: String = names.split(' ').map(|name| format!("property float {name}\n")).collect();
+    let scale = 0.12_f32.ln();
+    let row = format!("0 0 0 1.7724539 1.7724539 1.7724539 0 {scale} {scale} {scale} 1 0 0 0");
+    let path = folder.path().join("sphere.ply");
+    let text = format!("ply\nformat ascii 1.0\nelement vertex 1\n{properties}end_header\n{row}\n");
+    fs::write(&path, text).expect("the folder can be written to");
+
+    let drawn = |options: &ReadOptions, center: Vec2| {
+        let scene = load(&path, options).expect("a PLY of one Gaussian").into_runtime().expect("it can be drawn");
+        let size = UVec2::new(96, 64);
+        let lens = Lens::Intrinsics { focal: Vec2::splat(100.0), center };
+        let camera = Camera { lens, ..Camera::look_at(Vec3::new(0.0, -3.0, 0.0), Vec3::ZERO, Vec3::Z, 1.0, size) };
+        let view = camera.view(0.0, scene.trained_with.raster_fov);
+        deviations(&reference::render(&scene, &view, scene.trained_background()).picture)
+    };
+    for center in [Vec2::new(48.0, 32.0), Vec2::new(30.0, 41.0)] {
+        let found = drawn(&ReadOptions::default(), center);
+        // 100 · 0.12 / 3 pixels and the low-pass, without what is below 1/255.
+        let is_round = found.iter().all(|deviation| (deviation - 3.95).abs() < 0.03);
+        assert!(is_round, "principal point at {center}: {found:?} pixels");
+    }
+    let placeholder = ReadOptions { raster_fov: Some(RasterFov::Reference), ..ReadOptions::default() };
+    let [across, down] = drawn(&placeholder, Vec2::new(48.0, 32.0));
+    assert!(across > 1.3 * down, "the placeholder of the original trainer is an option: {across} x {down}");
 }

@@ -1,10 +1,17 @@
-//! Files of the conformance suite of the 4dgs format.
+//! Files of the 4dgs format.
 //!
-//! In: the files in the folder that `GS4D_DATA` names, with what a decoder must find in each. Out: proof that it is found.
+//! In: the files of its conformance suite in the folder that `GS4D_DATA` names, with what a decoder must find in each; exports. Out: proof that it is
+//! found, that exports are drawn as their scenes, and that a small file of many Gaussians is refused.
 
 use crate::support::data::data;
 use crate::support::skip::skip;
 use bevy_gs4d::codec::{ReadOptions, load};
+use bevy_gs4d::internal::codec::export::{Export, Exporter};
+use bevy_gs4d::reference;
+use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use bevy_gs4d::scene::{GaussianScene, RuntimeScene, SceneForm, Trained};
+use bevy_gs4d::view::{Background, Camera, Frame, RasterFov};
+use glam::{UVec2, Vec3};
 use serde_json::Value;
 use std::fs;
 
@@ -56,4 +63,84 @@ fn files_of_the_conformance_suite_are_read_as_their_descriptions_say() {
         }
     }
     assert!(count >= 13, "{count} files");
+}
+
+/// Size of the pictures that are compared.
+const SIZE: UVec2 = UVec2::new(80, 60);
+
+/// Returns a scene after an export and an import. The import plays in seconds.
+fn again(scene: &GaussianScene, id: &str) -> (RuntimeScene, Vec<String>) {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let format = Export::of_id(id).expect("a format");
+    let exporter = Exporter::new(scene.clone(), format, 30.0).expect("it can be exported");
+    let path = folder.path().join(format!("a.{}", format.extension));
+    let mut file = Vec::new();
+    exporter.write(0.0, &mut file).expect("memory can be written to");
+    fs::write(&path, file).expect("the folder can be written to");
+    let marginal_cutoff = Some(scene.trained_with.marginal_cutoff);
+    let options = ReadOptions { marginal_cutoff, ..ReadOptions::default() };
+    let found = load(&path, &options).unwrap_or_else(|error| panic!("{error}"));
+    (found.into_runtime().expect("it can be drawn"), exporter.lost().to_vec())
+}
+
+/// Returns a picture at a part of the clip, seen from a place beside its middle.
+fn drawn(scene: &RuntimeScene, from: Vec3, target: Vec3, part: f32) -> Frame {
+    let [first, last] = scene.trained_with.time_interval;
+    let camera = Camera::look_at(target + from, target, Vec3::Y, 0.7, SIZE);
+    let view = camera.view(first + part * (last - first), RasterFov::Corrected);
+    reference::render(scene, &view, Background::Color([0.0; 3]))
+}
+
+/// Returns the peak signal-to-noise ratio of two pictures whose colors are clamped, decibels.
+fn psnr(a: &Frame, b: &Frame) -> f64 {
+    let pairs = a.picture.pixels.iter().zip(&b.picture.pixels);
+    let squares: f64 = pairs
+        .map(|(a, b)| {
+            let difference = a.clamp(Vec3::ZERO, Vec3::ONE) - b.clamp(Vec3::ZERO, Vec3::ONE);
+            f64::from(difference.length_squared())
+        })
+        .sum();
+    10.0 * (3.0 * a.picture.pixels.len() as f64 / squares.max(1e-30)).log10()
+}
+
+#[test]
+fn large_opaque_splats_are_drawn_as_their_scene() {
+    let mut scene = synthesize(&SynthSettings { count: 500, ..SynthSettings::default() });
+    scene.form.truncate_colors(0, 0);
+    let SceneForm::Trained(Trained { parameters, .. }) = &mut scene.form else { panic!("the trained form") };
+    for (index, scale) in parameters.log_scale.iter_mut().enumerate() {
+        *scale = [1.5 + (index % 7) as f32 * 0.1, 1.0, 0.5 + (index % 5) as f32 * 0.1];
+    }
+    parameters.opacity_logit.fill(4.0);
+    let expected = scene.clone().into_runtime().expect("it can be drawn");
+    let (found, lost) = again(&scene, "4dgs");
+    for part in [0.2, 0.7] {
+        let [a, b] = [&found, &expected].map(|scene| drawn(scene, Vec3::new(2.0, 1.0, 3.0), Vec3::ZERO, part));
+        let found = psnr(&a, &b);
+        assert!(found > 80.0, "{found:.1} dB at {part}: splats cover each other in the same order");
+    }
+    assert!(lost.iter().any(|sentence| sentence.contains("read back")), "its precision is stated: {lost:?}");
+}
+
+#[test]
+fn the_bundled_capture_is_drawn_as_well_as_from_a_format_of_single_precision() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/toybox.gs4d");
+    let scene = load(path.as_ref(), &ReadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    let expected = scene.clone().into_runtime().expect("it can be drawn");
+    let files = ["4dgs", "free-time"].map(|id| again(&scene, id).0);
+    let picture = |scene: &RuntimeScene| drawn(scene, Vec3::new(3.0, -2.5, 2.0), Vec3::new(0.0, 0.0, 0.4), 0.4);
+    let [found, due] = files.each_ref().map(|file| psnr(&picture(file), &picture(&expected)));
+    assert!(found > due - 0.5 && due > 30.0, "{found:.1} dB, where single precision has {due:.1}");
+}
+
+#[test]
+fn more_gaussians_than_a_file_of_its_length_may_have_are_refused() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("a.4dgs");
+    // A record of a chunk: its times, its level, its number of Gaussians, no compression, no streams.
+    let contents = [&[0_u8; 20][..], &u32::MAX.to_le_bytes(), &[0; 4], &[0; 16]].concat();
+    let record = [&[5_u8][..], &(contents.len() as u64).to_le_bytes(), &contents].concat();
+    fs::write(&path, [&b"\x894DGS1\r\n"[..], &record].concat()).expect("the folder can be written to");
+    let error = load(&path, &ReadOptions::default()).expect_err("4 billion Gaussians").to_string();
+    assert!(error.contains("a.4dgs") && error.contains("may take"), "file, claim and limit: {error}");
 }

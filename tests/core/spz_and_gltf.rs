@@ -68,6 +68,15 @@ fn a_capture_of_playcanvas_in_spz_version_4_has_its_gaussians() {
 }
 
 #[test]
+fn the_filter_of_mip_splatting_is_that_of_the_file() {
+    for (name, mip_filter) in [("cloud_mip.spz", true), ("cloud_sh3.spz", false)] {
+        let Some(scene) = load(&format!("splat-transform/{name}")) else { return };
+        let found = scene.expect("a file that is read").trained_with.mip_filter;
+        assert_eq!(found, mip_filter, "{name}: the flag of the file");
+    }
+}
+
+#[test]
 fn small_spz_files_of_every_version_are_read() {
     for (name, z, red) in [
         ("minimal-v2.spz", -1.0, 1.11111),

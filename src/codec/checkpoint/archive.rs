@@ -1,32 +1,39 @@
-//! The zip archive of a checkpoint.
+//! The file of a checkpoint: a zip archive, or of torch before 1.6 pickles and values one after another.
 //!
 //! In: a seekable reader, and the [`Tensor`]s to read. Out: the small entries as bytes, and the values of one tensor at
-//! a time, read in one pass to their destination and checked against the checksum of the entry. Nothing else is read.
+//! a time, read in one pass to their destination and in an archive checked against the checksum of the entry. Nothing
+//! else is read.
 
 use super::error::CheckpointError;
+use super::legacy::{Legacy, PICKLE_LIMIT};
 use super::tensor::Tensor;
 use crate::codec::text;
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
 use zip::read::{ArchiveOffset, Config};
 use zip::{CompressionMethod, ZipArchive};
 
-/// Largest size of `data.pkl` in bytes. In real checkpoints it has about 5,000, for any number of Gaussians.
-const PICKLE_LIMIT: u64 = 1 << 20;
 /// Bytes read at once.
 const BUFFER: usize = 1 << 16;
 
-/// An archive with one `<root>/data.pkl`, all of whose entries are stored uncompressed.
+/// The file of a checkpoint.
 pub(super) struct Archive<R> {
-    zip: ZipArchive<R>,
-    root: Vec<u8>,
+    store: Store<R>,
     length: u64,
+}
+
+/// How a file holds its entries.
+enum Store<R> {
+    /// An archive with one `<root>/data.pkl`, all of whose entries are stored uncompressed.
+    Zip { zip: ZipArchive<R>, root: Vec<u8> },
+    /// A file of torch before 1.6.
+    Legacy(Legacy<R>),
 }
 
 /// A tensor of the state tuple.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Slot<'p> {
-    /// Index in the state tuple, from 0.
-    pub index: usize,
+    /// Index in the state tuple, from 0; `None` in a dictionary.
+    pub index: Option<usize>,
     /// Name of the attribute in the trainer.
     pub name: &'static str,
     /// Name of a row in messages: Gaussian or channel.
@@ -71,13 +78,16 @@ impl Slot<'_> {
 }
 
 impl<R: Read + Seek> Archive<R> {
-    /// Opens the archive and checks its directory.
+    /// Opens the file and checks its directory.
     ///
     /// # Errors
-    /// Not a zip archive, a compressed entry, an entry longer than the file, another byte order, no `data.pkl` or
-    /// several.
+    /// Neither a zip archive nor a file of torch before 1.6; a compressed entry, an entry longer than the file, another
+    /// byte order, no `data.pkl` or several.
     pub(super) fn open(mut reader: R) -> Result<Self, CheckpointError> {
         let length = reader.seek(SeekFrom::End(0)).map_err(CheckpointError::Io)?;
+        if Legacy::is_start_of(&mut reader).map_err(CheckpointError::Io)? {
+            return Ok(Self { store: Store::Legacy(Legacy::open(reader, length)?), length });
+        }
         // The archive starts at the beginning of the file; the search for its start fails for some checkpoints.
         let config = Config { archive_offset: ArchiveOffset::Known(0) };
         let zip = ZipArchive::with_config(config, reader).map_err(CheckpointError::Archive)?;
@@ -96,37 +106,61 @@ impl<R: Read + Seek> Archive<R> {
         }
         let count = roots.len();
         let root = roots.pop().filter(|_| count == 1).ok_or(CheckpointError::Root(count))?;
-        let mut archive = Self { zip, root, length };
+        let mut archive = Self { store: Store::Zip { zip, root }, length };
         match archive.small("byteorder", 64)? {
             Some(order) if order.trim_ascii() != b"little" => Err(CheckpointError::ByteOrder(printable(&order))),
             _ => Ok(archive),
         }
     }
 
-    /// Returns the bytes of `data.pkl`.
+    /// Returns the bytes of the pickle.
     ///
     /// # Errors
     /// An entry that cannot be read, is damaged or too large.
     pub(super) fn pickle(&mut self) -> Result<Vec<u8>, CheckpointError> {
-        self.small("data.pkl", PICKLE_LIMIT)?.ok_or(CheckpointError::Root(0))
+        match &self.store {
+            Store::Legacy(legacy) => Ok(legacy.pickle().to_vec()),
+            Store::Zip { .. } => self.small("data.pkl", PICKLE_LIMIT)?.ok_or(CheckpointError::Root(0)),
+        }
     }
 
     /// Returns the bytes of an entry; `None` if there is none of that name. An entry of more than `limit` bytes is an
     /// error.
     fn small(&mut self, name: &'static str, limit: u64) -> Result<Option<Vec<u8>>, CheckpointError> {
-        let Some(index) = self.index_of(name) else { return Ok(None) };
-        let mut entry = self.zip.by_index(index).map_err(CheckpointError::Archive)?;
-        let size = entry.size();
+        let Some((index, size)) = self.find(name)? else { return Ok(None) };
         if size > limit {
             return Err(CheckpointError::TooLarge { entry: name, size, limit });
         }
         let mut bytes = Vec::new();
-        entry.read_to_end(&mut bytes).map_err(CheckpointError::Io)?;
+        self.entry(index)?.read_to_end(&mut bytes).map_err(CheckpointError::Io)?;
         Ok(Some(bytes))
     }
 
-    fn index_of(&self, name: &str) -> Option<usize> {
-        self.zip.index_for_name_raw(&[&self.root[..], b"/", name.as_bytes()].concat())
+    /// Returns the index and the size in bytes of an entry; `None` if there is none of that name.
+    ///
+    /// # Errors
+    /// An entry that reaches beyond the end of the file.
+    fn find(&mut self, name: &str) -> Result<Option<(usize, u64)>, CheckpointError> {
+        let (zip, root) = match &mut self.store {
+            Store::Legacy(legacy) => return Ok(legacy.find(name)),
+            Store::Zip { zip, root } => (zip, root),
+        };
+        let Some(index) = zip.index_for_name_raw(&[&root[..], b"/", name.as_bytes()].concat()) else { return Ok(None) };
+        let entry = zip.by_index(index).map_err(CheckpointError::Archive)?;
+        let size = entry.size();
+        let end = entry.data_start().and_then(|start| start.checked_add(size));
+        if end.is_none_or(|end| end > self.length) {
+            return Err(CheckpointError::EntrySize { entry: printable(name.as_bytes()), size });
+        }
+        Ok(Some((index, size)))
+    }
+
+    /// Returns the bytes of an entry.
+    fn entry(&mut self, index: usize) -> Result<Box<dyn Read + '_>, CheckpointError> {
+        match &mut self.store {
+            Store::Legacy(legacy) => Ok(Box::new(legacy.entry(index).map_err(CheckpointError::Io)?)),
+            Store::Zip { zip, .. } => Ok(Box::new(zip.by_index(index).map_err(CheckpointError::Archive)?)),
+        }
     }
 
     /// Checks that a tensor has the shape given and that all its values are in the file.
@@ -141,13 +175,7 @@ impl<R: Read + Seek> Archive<R> {
         let storage = slot.tensor.storage;
         let name = format!("data/{}", storage.key);
         let missing = || slot.error(format!("entry {} is missing; copy the file again", printable(name.as_bytes())));
-        let index = self.index_of(&name).ok_or_else(missing)?;
-        let entry = self.zip.by_index(index).map_err(CheckpointError::Archive)?;
-        let size = entry.size();
-        let end = entry.data_start().and_then(|start| start.checked_add(size));
-        if end.is_none_or(|end| end > self.length) {
-            return Err(CheckpointError::EntrySize { entry: printable(name.as_bytes()), size });
-        }
+        let (index, size) = self.find(&name)?.ok_or_else(missing)?;
         let too_short = || slot.error(format!("a storage of {} values in an entry of {size} bytes", storage.count));
         if storage.count.checked_mul(4).is_none_or(|bytes| bytes > size) {
             return Err(too_short());
@@ -166,13 +194,28 @@ impl<R: Read + Seek> Archive<R> {
         if from.count == 0 {
             return Ok(());
         }
-        let Slot { index, name, row, tensor } = from.slot;
-        let entry = self.zip.by_index(from.entry).map_err(CheckpointError::Archive)?;
-        let mut reader = BufReader::with_capacity(BUFFER, entry);
+        self.read(from, &mut rows)?;
+        let Slot { name, row, .. } = from.slot;
+        match rows.iter_mut().position(|row| row.iter().any(|value| !value.is_finite())) {
+            Some(at) => Err(CheckpointError::NotFinite { name, row, at }),
+            None => Ok(()),
+        }
+    }
+
+    /// As [`fill`](Self::fill), with values that may be infinite or not numbers.
+    ///
+    /// # Errors
+    /// Values that cannot be read or do not match their checksum.
+    pub(super) fn read(&mut self, from: &Located, rows: &mut Rows) -> Result<(), CheckpointError> {
+        if from.count == 0 {
+            return Ok(());
+        }
+        let Slot { index, name, tensor, .. } = from.slot;
+        let mut reader = BufReader::with_capacity(BUFFER, self.entry(from.entry)?);
         let read = if tensor.is_contiguous() {
-            read_contiguous(&mut reader, tensor.offset, &mut rows)
+            read_contiguous(&mut reader, tensor.offset, rows)
         } else {
-            read_strided(&mut reader, tensor, from.storage, &mut rows)
+            read_strided(&mut reader, tensor, from.storage, rows)
         };
         // The checksum is compared at the end of the entry.
         read.and_then(|()| io::copy(&mut reader, &mut io::sink())).map_err(|reason| CheckpointError::Read {
@@ -180,10 +223,22 @@ impl<R: Read + Seek> Archive<R> {
             name,
             reason,
         })?;
-        match rows.iter_mut().position(|row| row.iter().any(|value| !value.is_finite())) {
-            Some(at) => Err(CheckpointError::NotFinite { name, row, at }),
-            None => Ok(()),
-        }
+        Ok(())
+    }
+
+    /// Reads a tensor of this shape as rows of `W` values, which may be infinite or not numbers.
+    ///
+    /// # Errors
+    /// As [`locate`](Self::locate) and [`read`](Self::read).
+    pub(super) fn any_rows<const W: usize>(
+        &mut self,
+        slot: Slot,
+        shape: &[usize],
+    ) -> Result<Vec<[f32; W]>, CheckpointError> {
+        let located = self.locate(slot, shape)?;
+        let mut values = vec![[0.0; W]; located.count / W];
+        self.read(&located, &mut Rows { values: values.as_flattened_mut(), pitch: W, start: 0, width: W })?;
+        Ok(values)
     }
 
     /// Reads a tensor of shape `count` × W.

@@ -1,19 +1,17 @@
 //! `cfg_args`, the text file that the trainer writes next to its checkpoints.
 //!
-//! In: the path of a checkpoint, and the text `Namespace(sh_degree=3, ..., white_background=False, prefilter_var=-1.0)`
+//! In: the files beside a checkpoint, and the text `Namespace(sh_degree=3, ..., white_background=False, prefilter_var=-1.0)`
 //! of the file in the same folder. Out: the entries that drawing depends on.
 
-use std::fs::File;
-use std::io::Read;
-use std::path::Path;
+use crate::codec::import::source::Beside;
 
-/// Largest number of bytes that is read of the file, which has about 300.
-const LIMIT: u64 = 1 << 16;
+/// Largest number of bytes that is used of the file, which has about 300.
+const LIMIT: usize = 1 << 16;
 
-/// Returns the text of the file in the folder of a checkpoint; `None` if it cannot be read, since it is optional.
-pub(super) fn read_for(checkpoint: &Path) -> Option<String> {
-    let mut text = Vec::new();
-    File::open(checkpoint.with_file_name("cfg_args")).ok()?.take(LIMIT).read_to_end(&mut text).ok()?;
+/// Returns the text of the file among those beside a checkpoint; `None` if it cannot be read, since it is optional.
+pub(super) fn read(beside: &dyn Beside) -> Option<String> {
+    let mut text = beside.read("cfg_args").ok()?;
+    text.truncate(LIMIT);
     Some(String::from_utf8_lossy(&text).into_owned())
 }
 

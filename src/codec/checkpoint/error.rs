@@ -16,9 +16,7 @@ pub enum CheckpointError {
     #[error("cannot be read ({0})")]
     Io(io::Error),
     /// Not exactly one `<folder>/data.pkl` in the archive.
-    #[error(
-        "{0} entries named <folder>/data.pkl where a checkpoint has one; only files of torch.save (1.6 and later) can be read"
-    )]
+    #[error("{0} entries named <folder>/data.pkl where a checkpoint has one; only files of torch.save can be read")]
     Root(usize),
     /// An entry that is compressed or encrypted, which torch never writes.
     #[error(
@@ -57,7 +55,9 @@ pub enum CheckpointError {
         reason: String,
     },
     /// An opcode that no checkpoint of the trainer contains.
-    #[error("data.pkl, byte {offset}: pickle opcode {code:#04x} is not one that 4DGS checkpoints use; refused")]
+    #[error(
+        "data.pkl, byte {offset}: pickle opcode {code:#04x} is not one that checkpoints use; refused. Export the Gaussians as PLY with the program that trained them"
+    )]
     Opcode {
         /// Offset in bytes from the start of `data.pkl`.
         offset: usize,
@@ -66,7 +66,7 @@ pub enum CheckpointError {
     },
     /// A Python object that no checkpoint of the trainer contains. No code of the file was run.
     #[error(
-        "data.pkl, byte {offset}: the file names the Python object `{name}`, which no 4DGS checkpoint needs; refused"
+        "data.pkl, byte {offset}: the file names the Python object `{name}`, which no 4DGS checkpoint needs; refused. Export the Gaussians as PLY with the program that trained them"
     )]
     Global {
         /// Offset in bytes from the start of `data.pkl`.
@@ -77,11 +77,11 @@ pub enum CheckpointError {
     /// The objects in the file are not the state of the 4DGS trainer.
     #[error("{0}")]
     Layout(String),
-    /// A slot of the state tuple holds the wrong kind of value.
-    #[error("slot {index} ({name}) holds {found}, expected {expected}")]
+    /// A slot of the state tuple, or an entry of a dictionary, holds the wrong kind of value.
+    #[error("{} holds {found}, expected {expected}", place(.index, .name))]
     Slot {
-        /// Index in the state tuple, from 0.
-        index: usize,
+        /// Index in the state tuple, from 0; `None` in a dictionary.
+        index: Option<usize>,
         /// Name of the attribute in the trainer.
         name: &'static str,
         /// The kind of value in the slot.
@@ -90,10 +90,10 @@ pub enum CheckpointError {
         expected: &'static str,
     },
     /// A tensor does not have the shape that the other tensors require.
-    #[error("slot {index} ({name}) has shape {found:?}, expected {expected}")]
+    #[error("{} has shape {found:?}, expected {expected}", place(.index, .name))]
     Shape {
-        /// Index in the state tuple, from 0.
-        index: usize,
+        /// Index in the state tuple, from 0; `None` in a dictionary.
+        index: Option<usize>,
         /// Name of the attribute in the trainer.
         name: &'static str,
         /// Its shape.
@@ -102,20 +102,20 @@ pub enum CheckpointError {
         expected: String,
     },
     /// A tensor lies outside its storage, or the storage is missing.
-    #[error("slot {index} ({name}): {reason}")]
+    #[error("{}: {reason}", place(.index, .name))]
     Tensor {
-        /// Index in the state tuple, from 0.
-        index: usize,
+        /// Index in the state tuple, from 0; `None` in a dictionary.
+        index: Option<usize>,
         /// Name of the attribute in the trainer.
         name: &'static str,
         /// The reason.
         reason: String,
     },
     /// The values of a tensor could not be read, or do not match their checksum.
-    #[error("slot {index} ({name}) cannot be read ({reason}); the file is damaged, copy it again")]
+    #[error("{} cannot be read ({reason}); the file is damaged, copy it again", place(.index, .name))]
     Read {
-        /// Index in the state tuple, from 0.
-        index: usize,
+        /// Index in the state tuple, from 0; `None` in a dictionary.
+        index: Option<usize>,
         /// Name of the attribute in the trainer.
         name: &'static str,
         /// The error of the system.
@@ -142,4 +142,12 @@ pub enum CheckpointError {
     /// An invalid option.
     #[error(transparent)]
     Option(#[from] InvalidOption),
+}
+
+/// Returns the words for a slot of the state tuple, or for an entry of a dictionary.
+fn place(index: &Option<usize>, name: &str) -> String {
+    match index {
+        Some(index) => format!("slot {index} ({name})"),
+        None => name.to_owned(),
+    }
 }

@@ -5,7 +5,8 @@
 
 use super::cfg_args::CfgArgs;
 use crate::codec::options::ReadOptions;
-use crate::scene::{PlaybackHints, RotationConvention, TrainedCameras, TrainedWith, UpAxis};
+use crate::scene::{Origin, PlaybackHints, RotationConvention, TrainedCameras, TrainedWith, UpAxis};
+use crate::view::NEAR;
 
 /// Values from the file itself.
 pub(super) struct FromFile {
@@ -32,9 +33,8 @@ pub(super) fn trained_with(options: &ReadOptions, cfg_args: Option<&str>, file: 
         prefilter_var: options.prefilter_var.or(cfg.prefilter_var).unwrap_or(default.prefilter_var),
         marginal_cutoff: options.marginal_cutoff.unwrap_or(default.marginal_cutoff),
         iteration: file.iteration,
-        pixel: default.pixel,
-        validation: default.validation,
         spatial_lr_scale: file.spatial_lr_scale,
+        ..default
     }
 }
 
@@ -51,7 +51,7 @@ pub fn describe(trained_with: &TrainedWith, playback: &PlaybackHints) -> Vec<(&'
     let [first, last] = trained_with.time_interval;
     let [r, g, b] = trained_with.background;
     let prefilter = trained_with.prefilter_var;
-    vec![
+    let mut pairs = vec![
         ("time interval", format!("{first} to {last}")),
         ("background", format!("{r}, {g}, {b}")),
         ("rotation convention", lowercase(trained_with.rotation_convention)),
@@ -65,14 +65,26 @@ pub fn describe(trained_with: &TrainedWith, playback: &PlaybackHints) -> Vec<(&'
         ("training pixel", trained_with.pixel.map_or("not known".to_owned(), |pixel| format!("{pixel} units"))),
         ("up", axis(playback.up).to_owned()),
         ("duration", format!("{} s", playback.duration_seconds)),
-    ]
+    ];
+    if trained_with.near != NEAR {
+        pairs.push(("near limit", format!("{} units", trained_with.near)));
+    }
+    if trained_with.mip_filter {
+        pairs.push(("filter", "Mip-Splatting".to_owned()));
+    }
+    if !trained_with.origin.is_zero() {
+        let Origin { place: [x, y, z], time } = trained_with.origin;
+        pairs.push(("origin", format!("({x}, {y}, {z}), time {time}")));
+    }
+    pairs
 }
 
 fn lowercase(value: impl std::fmt::Debug) -> String {
     format!("{value:?}").to_lowercase()
 }
 
-fn axis(up: UpAxis) -> &'static str {
+/// Returns the name of an axis: `+z`.
+pub(crate) fn axis(up: UpAxis) -> &'static str {
     match up {
         UpAxis::PosX => "+x",
         UpAxis::NegX => "-x",

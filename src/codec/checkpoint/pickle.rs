@@ -4,18 +4,21 @@
 //! contain the location of their values only.
 //!
 //! Only the opcodes and objects that `torch.save` writes for checkpoints of the trainer are accepted; everything else
-//! is refused by name, and nothing is ever executed. Every step adds at most one value, values refer to each other by
-//! index (so nothing recurses), and no value is copied: time and memory are bounded by the length of the input.
+//! is refused by name, and nothing is ever executed. The files of other trainers have more in them: there, other objects
+//! are kept as their names alone ([`Value::Inert`]), and calls of them, too. Every step adds at most one value, values
+//! refer to each other by index (so nothing recurses), and no value is copied: time and memory are bounded by the length
+//! of the input.
 
 use super::error::CheckpointError;
 use super::tensor::{Storage, Tensor};
 use crate::codec::text::printable;
 use std::collections::HashMap;
+use std::fmt;
 
 /// Index of a value in a [`Pickle`].
 pub(super) type Id = u32;
 
-/// A value of a pickle. Lists and dictionaries contain optimizer state only, so their items are dropped.
+/// A value of a pickle.
 #[derive(Debug)]
 pub(super) enum Value<'a> {
     None,
@@ -25,13 +28,30 @@ pub(super) enum Value<'a> {
     Text(&'a str),
     Bytes(Vec<u8>),
     Tuple(Vec<Id>),
-    List,
-    Dict,
+    List(Vec<Id>),
+    /// Keys and values, alternating.
+    Dict(Vec<Id>),
     Global(Global),
     Storage(Storage<'a>),
     Tensor(Box<Tensor<'a>>),
     /// A numpy floating-point type, with its size in bytes.
     Dtype(usize),
+    /// A Python object that is not known, or what a call of it would return.
+    Inert(Name<'a>),
+}
+
+/// The name of a Python object: module and name, as in the pickle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Name<'a> {
+    module: &'a [u8],
+    name: &'a [u8],
+}
+
+impl fmt::Display for Name<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let name = format!("{} {}", String::from_utf8_lossy(self.module), String::from_utf8_lossy(self.name));
+        f.write_str(&printable(name.trim()))
+    }
 }
 
 impl Value<'_> {
@@ -45,9 +65,9 @@ impl Value<'_> {
             Self::Text(_) => "a text",
             Self::Bytes(_) => "bytes",
             Self::Tuple(_) => "a tuple",
-            Self::List => "a list",
-            Self::Dict => "a dictionary",
-            Self::Global(_) | Self::Dtype(_) => "a Python object",
+            Self::List(_) => "a list",
+            Self::Dict(_) => "a dictionary",
+            Self::Global(_) | Self::Dtype(_) | Self::Inert(_) => "a Python object",
             Self::Storage(_) => "a storage without a tensor",
             Self::Tensor(_) => "a tensor",
         }
@@ -86,6 +106,10 @@ impl Global {
 pub(super) struct Pickle<'a> {
     values: Vec<Value<'a>>,
     root: Id,
+    /// Bytes of the pickle.
+    length: usize,
+    /// Bytes of a value of each storage.
+    sizes: HashMap<&'a str, u64>,
 }
 
 impl<'a> Pickle<'a> {
@@ -94,15 +118,54 @@ impl<'a> Pickle<'a> {
     /// # Errors
     /// The first opcode, object or argument that is not one of a checkpoint.
     pub(super) fn parse(bytes: &'a [u8]) -> Result<Self, CheckpointError> {
-        let mut machine = Machine { bytes, ..Machine::default() };
-        if !bytes.starts_with(&[op::PROTO, 2]) {
-            return Err(machine.error("not a pickle of protocol 2"));
+        Self::run(Machine { bytes, ..Machine::default() })
+    }
+
+    /// Parses a pickle of another program: objects that no checkpoint of the trainer contains are kept as their names.
+    ///
+    /// # Errors
+    /// The first opcode that `torch.save` does not write; a pickle that is cut.
+    pub(super) fn parse_inert(bytes: &'a [u8]) -> Result<Self, CheckpointError> {
+        Self::run(Machine { bytes, is_inert: true, ..Machine::default() })
+    }
+
+    fn run(mut machine: Machine<'a>) -> Result<Self, CheckpointError> {
+        if !machine.bytes.starts_with(&[op::PROTO, 2]) {
+            return Err(machine.error(
+                "not a pickle of protocol 2, which torch.save writes unless it is told otherwise; save it again with \
+                 torch.save(torch.load(path, map_location=\"cpu\", weights_only=False), path)",
+            ));
         }
         loop {
             if let Some(root) = machine.step()? {
-                return Ok(Self { values: machine.values, root });
+                let Machine { values, at, sizes, .. } = machine;
+                return Ok(Self { values, root, length: at, sizes });
             }
         }
+    }
+
+    /// Returns the number of bytes of the pickle, which others may follow.
+    pub(super) fn length(&self) -> usize {
+        self.length
+    }
+
+    /// Returns the number of bytes of each value of a storage; `None` if no tensor has it.
+    pub(super) fn size_of_storage(&self, key: &str) -> Option<u64> {
+        self.sizes.get(key).copied()
+    }
+
+    /// Returns the keys that are texts, and the values, of a dictionary; nothing of another value.
+    pub(super) fn entries(&self, dictionary: &Value<'a>) -> impl DoubleEndedIterator<Item = (&'a str, &Value<'a>)> {
+        let ids = if let Value::Dict(ids) = dictionary { &ids[..] } else { &[] };
+        ids.as_chunks::<2>().0.iter().filter_map(move |&[key, value]| match self.get(key) {
+            &Value::Text(key) => Some((key, self.get(value))),
+            _ => None,
+        })
+    }
+
+    /// Returns the value of a key of a dictionary.
+    pub(super) fn entry(&self, dictionary: &Value<'a>, key: &str) -> Option<&Value<'a>> {
+        self.entries(dictionary).rfind(|&(found, _)| found == key).map(|(_, value)| value)
     }
 
     /// Returns the outermost value.
@@ -137,6 +200,7 @@ mod op {
     pub(super) const APPEND: u8 = b'a';
     pub(super) const APPENDS: u8 = b'e';
     pub(super) const EMPTY_DICT: u8 = b'}';
+    pub(super) const SETITEM: u8 = b's';
     pub(super) const SETITEMS: u8 = b'u';
     pub(super) const GLOBAL: u8 = b'c';
     pub(super) const REDUCE: u8 = b'R';
@@ -146,6 +210,13 @@ mod op {
     pub(super) const LONG_BINPUT: u8 = b'r';
     pub(super) const BINGET: u8 = b'h';
     pub(super) const LONG_BINGET: u8 = b'j';
+    // Only in files of other programs.
+    pub(super) const LONG1: u8 = 0x8a;
+    pub(super) const LONG4: u8 = 0x8b;
+    pub(super) const NEWOBJ: u8 = 0x81;
+    pub(super) const POP: u8 = b'0';
+    pub(super) const POP_MARK: u8 = b'1';
+    pub(super) const DUP: u8 = b'2';
 }
 
 /// Largest number of axes of a tensor; tensors that are read have at most three.
@@ -165,6 +236,10 @@ struct Machine<'a> {
     /// Lengths of the stack at each MARK.
     marks: Vec<usize>,
     memo: HashMap<u32, Id>,
+    /// Whether objects that are not known are kept as their names.
+    is_inert: bool,
+    /// Bytes of a value of each storage.
+    sizes: HashMap<&'a str, u64>,
 }
 
 impl<'a> Machine<'a> {
@@ -208,25 +283,27 @@ impl<'a> Machine<'a> {
                 let items = self.pop_many(usize::from(code - op::TUPLE1) + 1)?;
                 self.push(Value::Tuple(items));
             }
-            op::EMPTY_LIST => self.push(Value::List),
+            op::EMPTY_LIST => self.push(Value::List(Vec::new())),
             op::APPEND => {
-                self.pop()?;
-                self.expect_list()?;
+                let items = self.pop_many(1)?;
+                self.append(items)?;
             }
             op::APPENDS => {
-                self.pop_to_mark()?;
-                self.expect_list()?;
+                let items = self.pop_to_mark()?;
+                self.append(items)?;
             }
-            op::EMPTY_DICT => self.push(Value::Dict),
+            op::EMPTY_DICT => self.push(Value::Dict(Vec::new())),
+            op::SETITEM => {
+                let items = self.pop_many(2)?;
+                self.set_items(items)?;
+            }
             op::SETITEMS => {
                 let items = self.pop_to_mark()?;
-                if items.len() % 2 != 0 || !matches!(self.value(self.top()?), Value::Dict) {
-                    return Err(self.error("items without a dictionary to add them to"));
-                }
+                self.set_items(items)?;
             }
             op::GLOBAL => {
                 let global = self.global()?;
-                self.push(Value::Global(global));
+                self.push(global);
             }
             op::REDUCE => {
                 let (arguments, callable) = (self.pop()?, self.pop()?);
@@ -234,12 +311,15 @@ impl<'a> Machine<'a> {
             }
             op::BUILD => {
                 let state = self.pop()?;
-                self.expect_little_endian(state)?;
+                // The state of an object that is not known is not needed either.
+                if !self.is_inert {
+                    self.expect_little_endian(state)?;
+                }
             }
             op::BINPERSID => {
                 let id = self.pop()?;
                 let storage = self.storage(id)?;
-                self.push(Value::Storage(storage));
+                self.push(storage);
             }
             op::BINPUT => {
                 let index = self.byte()?;
@@ -257,9 +337,45 @@ impl<'a> Machine<'a> {
                 let index = u32::from_le_bytes(self.array()?);
                 self.recall(index)?;
             }
+            _ if self.is_inert => self.other(code)?,
             _ => return Err(CheckpointError::Opcode { offset: self.opcode_at, code }),
         }
         Ok(None)
+    }
+
+    /// Interprets an opcode that only files of other programs have.
+    fn other(&mut self, code: u8) -> Result<(), CheckpointError> {
+        match code {
+            op::LONG1 => {
+                let length = self.byte()?;
+                self.long(length.into())?;
+            }
+            op::LONG4 => {
+                let length = u32::from_le_bytes(self.array()?);
+                self.long(length as usize)?;
+            }
+            op::NEWOBJ => {
+                self.pop()?;
+                let class = self.pop()?;
+                self.push(Value::Inert(self.name_of(class)));
+            }
+            // A mark on top counts as a value.
+            op::POP if self.available() == 0 && !self.marks.is_empty() => {
+                self.marks.pop();
+            }
+            op::POP => {
+                self.pop()?;
+            }
+            op::POP_MARK => {
+                self.pop_to_mark()?;
+            }
+            op::DUP => {
+                let top = self.top()?;
+                self.stack.push(top);
+            }
+            _ => return Err(CheckpointError::Opcode { offset: self.opcode_at, code }),
+        }
+        Ok(())
     }
 
     fn error(&self, reason: impl Into<String>) -> CheckpointError {
@@ -300,12 +416,30 @@ impl<'a> Machine<'a> {
         Ok(line)
     }
 
-    fn global(&mut self) -> Result<Global, CheckpointError> {
+    fn global(&mut self) -> Result<Value<'a>, CheckpointError> {
         let (module, name) = (self.line()?, self.line()?);
-        Global::of(module, name).ok_or_else(|| {
-            let name = format!("{} {}", String::from_utf8_lossy(module), String::from_utf8_lossy(name));
-            CheckpointError::Global { offset: self.opcode_at, name: printable(&name) }
-        })
+        let inert = Name { module, name };
+        match Global::of(module, name) {
+            Some(global) => Ok(Value::Global(global)),
+            None if self.is_inert => Ok(Value::Inert(inert)),
+            None => Err(CheckpointError::Global { offset: self.opcode_at, name: inert.to_string() }),
+        }
+    }
+
+    /// Pushes an int of so many bytes, the most significant one last.
+    fn long(&mut self, length: usize) -> Result<(), CheckpointError> {
+        let bytes = self.take(length)?;
+        let value = match bytes.last() {
+            None => Value::Int(0),
+            Some(last) if length <= 8 => {
+                let mut all = [if last & 0x80 == 0 { 0 } else { 0xff }; 8];
+                all[..length].copy_from_slice(bytes);
+                Value::Int(i64::from_le_bytes(all))
+            }
+            Some(_) => Value::Inert(Name { module: b"builtins", name: b"int" }),
+        };
+        self.push(value);
+        Ok(())
     }
 
     // The stack.
@@ -362,11 +496,29 @@ impl<'a> Machine<'a> {
         Ok(())
     }
 
-    fn expect_list(&self) -> Result<(), CheckpointError> {
-        match self.value(self.top()?) {
-            Value::List => Ok(()),
-            other => Err(self.error(format!("items to be added to {}, not a list", other.kind()))),
+    /// Appends items to the list on top.
+    fn append(&mut self, items: Vec<Id>) -> Result<(), CheckpointError> {
+        let top = self.top()?;
+        match &mut self.values[top as usize] {
+            Value::List(all) => all.extend(items),
+            _ if self.is_inert => {}
+            other => {
+                let kind = other.kind();
+                return Err(self.error(format!("items to be added to {kind}, not a list")));
+            }
         }
+        Ok(())
+    }
+
+    /// Adds keys and values to the dictionary on top.
+    fn set_items(&mut self, items: Vec<Id>) -> Result<(), CheckpointError> {
+        let top = self.top()?;
+        match &mut self.values[top as usize] {
+            Value::Dict(all) if items.len().is_multiple_of(2) => all.extend(items),
+            _ if self.is_inert => {}
+            _ => return Err(self.error("items without a dictionary to add them to")),
+        }
+        Ok(())
     }
 
     // The objects.
@@ -382,16 +534,32 @@ impl<'a> Machine<'a> {
         Err(self.error("a state other than that of a little-endian numpy type"))
     }
 
-    /// Returns the storage of a persistent id: `("storage", FloatStorage, key, location, element count)`.
-    fn storage(&self, id: Id) -> Result<Storage<'a>, CheckpointError> {
+    /// Returns the storage of a persistent id: `("storage", FloatStorage, key, location, element count)`, in files of
+    /// torch before 1.6 with `None` after it: the storage is a part of no other.
+    fn storage(&mut self, id: Id) -> Result<Value<'a>, CheckpointError> {
         if let Value::Tuple(items) = self.value(id)
-            && let &[tag, class, key, _, count] = items.as_slice()
-            && let (Value::Text("storage"), Value::Global(Global::FloatStorage)) = (self.value(tag), self.value(class))
-            && let (&Value::Text(key), Some(count)) = (self.value(key), self.count(count))
+            && let &[tag, class, key, _, count, ref view @ ..] = items.as_slice()
+            && let (Value::Text("storage"), &Value::Text(key)) = (self.value(tag), self.value(key))
+            && let Some(count) = self.count(count)
+            && view.iter().all(|&view| matches!(self.value(view), Value::None))
         {
-            return Ok(Storage { key, count });
+            let (is_float, name) =
+                (matches!(self.value(class), Value::Global(Global::FloatStorage)), self.name_of(class));
+            if is_float || self.is_inert {
+                self.sizes.extend(size_of_value(name.name).map(|size| (key, size)));
+                return Ok(if is_float { Value::Storage(Storage { key, count }) } else { Value::Inert(name) });
+            }
         }
         Err(self.error("a persistent id that is not that of a float storage"))
+    }
+
+    /// Returns the name of an object, which is the kind of a value that has none.
+    fn name_of(&self, id: Id) -> Name<'a> {
+        match self.value(id) {
+            Value::Inert(name) => *name,
+            Value::Global(Global::FloatStorage) => Name { module: b"torch", name: b"FloatStorage" },
+            other => Name { module: b"", name: other.kind().as_bytes() },
+        }
     }
 
     fn count(&self, id: Id) -> Option<u64> {
@@ -404,7 +572,7 @@ impl<'a> Machine<'a> {
     /// Evaluates a call of `callable` and pushes the result.
     fn reduce(&mut self, callable: Id, arguments: Id) -> Result<(), CheckpointError> {
         let (&Value::Global(global), Value::Tuple(arguments)) = (self.value(callable), self.value(arguments)) else {
-            return Err(self.error("a call of a value that is not a function"));
+            return self.keep(callable, "a call of a value that is not a function".to_owned());
         };
         let result = match (global, arguments.as_slice()) {
             (Global::RebuildParameter, &[data, _, _]) if matches!(self.value(data), Value::Tensor(_)) => {
@@ -416,7 +584,7 @@ impl<'a> Machine<'a> {
                 Global::RebuildTensor,
                 &[storage, offset, size, stride, _, _] | &[storage, offset, size, stride, _, _, _],
             ) => self.tensor(storage, offset, size, stride),
-            (Global::OrderedDict, []) => Some(Value::Dict),
+            (Global::OrderedDict, []) => Some(Value::Dict(Vec::new())),
             (Global::NumpyDtype, &[name, _, _]) => match self.value(name) {
                 Value::Text("f8") => Some(Value::Dtype(8)),
                 Value::Text("f4") => Some(Value::Dtype(4)),
@@ -426,9 +594,25 @@ impl<'a> Machine<'a> {
             (Global::Encode, &[text, encoding]) => self.encode(text, encoding),
             _ => None,
         };
-        let value =
-            result.ok_or_else(|| self.error(format!("{global:?} is called with arguments that no checkpoint has")))?;
+        let Some(value) = result else {
+            // A tensor of another type of number is named by its storage.
+            let is_named = |id: &&Id| matches!(self.value(**id), Value::Inert(_));
+            let named = arguments.first().filter(is_named).copied().unwrap_or(callable);
+            return self.keep(named, format!("{global:?} is called with arguments that no checkpoint has"));
+        };
         self.push(value);
+        Ok(())
+    }
+
+    /// Pushes what a call that is not evaluated would return, under the name of an object.
+    ///
+    /// # Errors
+    /// The reason, in a checkpoint of the trainer.
+    fn keep(&mut self, named: Id, reason: String) -> Result<(), CheckpointError> {
+        if !self.is_inert {
+            return Err(self.error(reason));
+        }
+        self.push(Value::Inert(self.name_of(named)));
         Ok(())
     }
 
@@ -465,6 +649,18 @@ impl<'a> Machine<'a> {
             _ => None,
         }
     }
+}
+
+/// Returns the bytes of a value in a storage of this class.
+fn size_of_value(class: &[u8]) -> Option<u64> {
+    Some(match class {
+        b"ByteStorage" | b"CharStorage" | b"BoolStorage" => 1,
+        b"HalfStorage" | b"BFloat16Storage" | b"ShortStorage" => 2,
+        b"FloatStorage" | b"IntStorage" => 4,
+        b"DoubleStorage" | b"LongStorage" | b"ComplexFloatStorage" => 8,
+        b"ComplexDoubleStorage" => 16,
+        _ => return None,
+    })
 }
 
 #[cfg(test)]
@@ -505,6 +701,26 @@ mod tests {
         ] {
             assert!(Pickle::parse(bytes).is_err(), "{bytes:?} pops a value or a mark that is not on the stack");
         }
+    }
+
+    #[test]
+    fn in_files_of_other_programs_foreign_objects_are_names_that_are_never_called() {
+        // {"a": os.system("ls"), "b": collections.OrderedDict, "c": 2 ** 65, "d": -2}, with a call, a state and a big int.
+        let bytes = b"\x80\x02}(X\x01\0\0\0acos\nsystem\n(X\x02\0\0\0lstR}bX\x01\0\0\0bcmy\nClass\n)\x81\
+            X\x01\0\0\0c\x8a\x09\0\0\0\0\0\0\0\0\x02X\x01\0\0\0d\x8a\x01\xfeu.";
+        assert!(Pickle::parse(bytes).is_err(), "no checkpoint of the trainer has these");
+        let pickle = Pickle::parse_inert(bytes).expect("valid");
+        let named = |key: &str| match pickle.entry(pickle.root(), key) {
+            Some(Value::Inert(name)) => name.to_string(),
+            other => panic!("{key} is inert: {other:?}"),
+        };
+        assert_eq!([named("a"), named("b")], ["os system", "my Class"], "what is not called has its name");
+        assert_eq!(named("c"), "builtins int", "an int that is too large");
+        assert!(matches!(pickle.entry(pickle.root(), "d"), Some(Value::Int(-2))), "a small int");
+        assert_eq!(pickle.length(), bytes.len(), "all bytes");
+        let keys: Vec<&str> = pickle.entries(pickle.root()).map(|(key, _)| key).collect();
+        assert_eq!(keys, ["a", "b", "c", "d"], "the keys in order");
+        assert_eq!(pickle.entry(pickle.root(), "e").map(Value::kind), None, "a key that is not there");
     }
 
     #[test]

@@ -6,12 +6,15 @@
 use super::archive::{Archive, Rows, Slot};
 use super::error::CheckpointError;
 use super::pickle::{Id, Pickle, Value};
+use crate::codec::text::printable;
 use crate::gaussian::{Harmonics, Model, Parameters};
 use crate::scene::Environment;
 use std::io::{Read, Seek};
 
 /// Largest number of coefficients per channel in the trainer: 16 spatial ones for each of three time blocks.
 const COEFFICIENTS: u64 = 48;
+/// Most keys of a dictionary in an error.
+const KEYS: usize = 8;
 /// Largest number of texels along an edge of an environment map.
 const ENVIRONMENT_EDGE: u64 = 16_384;
 
@@ -53,12 +56,12 @@ impl<'p> Slots<'p> {
     }
 
     fn error(&self, index: usize, name: &'static str, expected: &'static str) -> CheckpointError {
-        CheckpointError::Slot { index, name, found: self.value(index).kind(), expected }
+        CheckpointError::Slot { index: Some(index), name, found: self.value(index).kind(), expected }
     }
 
     fn tensor(&self, index: usize, name: &'static str) -> Result<Slot<'p>, CheckpointError> {
         match self.value(index) {
-            Value::Tensor(tensor) => Ok(Slot { index, name, row: "Gaussian", tensor }),
+            Value::Tensor(tensor) => Ok(Slot { index: Some(index), name, row: "Gaussian", tensor }),
             _ => Err(self.error(index, name, "a tensor")),
         }
     }
@@ -236,9 +239,17 @@ impl<'p> State<'p> {
 fn pair<'p>(pickle: &'p Pickle<'p>) -> Result<(Slots<'p>, u64), CheckpointError> {
     let layout = |found: String| {
         CheckpointError::Layout(format!(
-            "the file holds {found}, expected the pair (state, iteration) that the 4DGS trainer writes to chkpnt*.pth"
+            "the file holds {found}, expected the pair (state, iteration) that the 4DGS trainer writes to chkpnt*.pth, or the Gaussians of \
+             gsplat or nerfstudio; export them as PLY with the program that trained them"
         ))
     };
+    if matches!(pickle.root(), Value::Dict(_)) {
+        let keys: Vec<&str> = pickle.entries(pickle.root()).map(|(key, _)| key).take(KEYS).collect();
+        return Err(layout(match keys[..] {
+            [] => "a dictionary without names".to_owned(),
+            _ => format!("a dictionary of {}", printable(&keys.join(", "))),
+        }));
+    }
     let Value::Tuple(items) = pickle.root() else { return Err(layout(pickle.root().kind().to_owned())) };
     let &[state, iteration] = items.as_slice() else {
         return Err(layout(format!("a tuple of {} values", items.len())));

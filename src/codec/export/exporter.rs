@@ -8,6 +8,7 @@ use super::error::ExportError;
 use super::table::{Export, What};
 use super::{instant, lost, moving};
 use crate::codec::import::columns::Columns;
+use crate::codec::import::drawable::keep;
 use crate::scene::GaussianScene;
 use std::io::{self, Write};
 
@@ -19,6 +20,8 @@ pub struct Exporter {
     clip: Clip,
     /// All Gaussians with their motion; `None` if the format has none.
     moving: Option<Columns>,
+    /// The file, if only the encoded file shows what it loses.
+    encoded: Option<Vec<u8>>,
     lost: Vec<String>,
 }
 
@@ -29,15 +32,16 @@ impl Exporter {
     /// A Gaussian that cannot be drawn; a scene that has no equivalent in the format.
     pub fn new(scene: GaussianScene, format: &'static Export, fps: f32) -> Result<Self, ExportError> {
         let scene = scene.unpacked();
-        let mut lost = lost::of(&scene);
+        let mut lost = lost::of(&scene, format);
         let moving = match format.what {
             What::Instant(_) => None,
-            What::Moving(_) | What::Windowed(_) => {
-                let (columns, own) = moving::moving(&scene, matches!(format.what, What::Windowed(_)))?;
+            What::Moving(_) | What::Windowed(_) | What::Encoded(_) => {
+                let (columns, own) = moving::moving(&scene, !matches!(format.what, What::Moving(_)))?;
                 lost.extend(own);
                 Some(columns)
             }
         };
+        lost.extend(left_out(&scene, format)?);
         lost.extend(format.lost.iter().map(|&sentence| sentence.to_owned()));
         let clip = Clip {
             time_interval: scene.trained_with.time_interval,
@@ -46,7 +50,13 @@ impl Exporter {
             up: scene.playback.up,
             marginal_cutoff: scene.trained_with.marginal_cutoff,
         };
-        Ok(Self { scene, format, clip, moving, lost })
+        let mut encoded = None;
+        if let (What::Encoded(encode), Some(columns)) = (format.what, &moving) {
+            let (bytes, own) = encode(columns, &clip)?;
+            lost.extend(own);
+            encoded = Some(bytes);
+        }
+        Ok(Self { scene, format, clip, moving, encoded, lost })
     }
 
     /// Returns what of the scene the files do not show: one sentence each.
@@ -63,12 +73,57 @@ impl Exporter {
         let columns = match &self.moving {
             Some(columns) => columns,
             None => {
-                at_time = instant::at(&self.scene, time).map_err(io::Error::other)?;
+                at_time = within(instant::at(&self.scene, time).map_err(io::Error::other)?, self.format);
                 &at_time
             }
         };
-        let (What::Instant(write) | What::Moving(write) | What::Windowed(write)) = self.format.what;
-        write(columns, &self.clip, writer)?;
+        match self.format.what {
+            What::Instant(write) | What::Moving(write) | What::Windowed(write) => write(columns, &self.clip, writer)?,
+            What::Encoded(_) => writer.write_all(self.encoded.as_deref().unwrap_or_default())?,
+        }
         Ok(columns.len())
     }
+}
+
+/// Returns the Gaussians that a file of the format holds.
+fn within(mut columns: Columns, format: &Export) -> Columns {
+    if let Some((_, kept)) = far(&columns, format) {
+        keep(&mut columns, &kept);
+    }
+    columns
+}
+
+/// Returns a sentence about the Gaussians that are left out since they are too far for the format; of a capture that moves about most of those at its
+/// beginning, in its middle and at its end.
+fn left_out(scene: &GaussianScene, format: &Export) -> Result<Option<String>, ExportError> {
+    if format.farthest.is_none() {
+        return Ok(None);
+    }
+    let [first, last] = scene.trained_with.time_interval;
+    let moves = scene.playback.duration_seconds > 0.0;
+    let times = if moves { vec![first, 0.5 * (first + last), last] } else { vec![first] };
+    let mut most = None;
+    for time in times {
+        let columns = instant::at(scene, time)?;
+        if let Some((limit, kept)) = far(&columns, format) {
+            let number = columns.len() - kept.len();
+            most = most.max(Some((number, columns.len(), limit as u32)));
+        }
+    }
+    let up_to = if moves { "Up to " } else { "" };
+    Ok(most.map(|(number, all, limit)| {
+        format!(
+            "{up_to}{number} of {all} Gaussians are left out: along an axis they are farther than {limit} units, up to which {} has enough \
+             digits for the others.",
+            format.name
+        )
+    }))
+}
+
+/// Returns the farthest coordinate that a file of the format holds, and the Gaussians within; `None` if all are.
+fn far(columns: &Columns, format: &Export) -> Option<(f32, Vec<usize>)> {
+    let limit = format.farthest?(columns);
+    let is_within = |&index: &usize| columns.mean[index].iter().all(|value| value.abs() <= limit);
+    let kept: Vec<usize> = (0..columns.len()).filter(is_within).collect();
+    (kept.len() < columns.len()).then_some((limit, kept))
 }

@@ -7,7 +7,7 @@ use super::still::Ready;
 use crate::codec::import::columns::Columns;
 use crate::gaussian::InvalidGaussian;
 use crate::gaussian::harmonics::time_cosine;
-use crate::scene::GaussianScene;
+use crate::scene::{GaussianScene, TrainedWith};
 use rayon::prelude::*;
 
 /// Returns the Gaussians that are drawn at a time, which is in the unit of the scene. A packed scene is unpacked for each call: callers of many
@@ -32,7 +32,8 @@ pub(crate) fn at(scene: &GaussianScene, time: f32) -> Result<Columns, InvalidGau
         let tau = ready.gaussians[index].mean_t - time;
         ready.write_colors(index, |n| time_cosine(n, tau, span), colors);
     });
-    let mut columns = Columns { harmonics, ..Columns::default() };
+    let TrainedWith { origin, mip_filter, .. } = &scene.trained_with;
+    let mut columns = Columns { harmonics, origin: origin.place, mip_filter: *mip_filter, ..Columns::default() };
     columns.mean = drawn.par_iter().map(|&index| ready.gaussians[index].mean_at(time).to_array()).collect();
     let stills: Vec<_> =
         drawn.par_iter().map(|&index| ready.still(index, ready.gaussians[index].marginal(time))).collect();

@@ -1,12 +1,14 @@
 //! What a file of another make does not hold, whatever the format.
 //!
-//! In: a scene. Out: a sentence about each of its parts that other players do not know.
+//! In: a scene and a format. Out: a sentence about each of its parts that other players do not know.
 
+use super::table::Export;
+use crate::codec::checkpoint::options::axis;
 use crate::gaussian::{Model, ShDirection};
-use crate::scene::GaussianScene;
+use crate::scene::{GaussianScene, Origin, UpAxis};
 
 /// Returns a sentence about each part of the scene that is not exported.
-pub(crate) fn of(scene: &GaussianScene) -> Vec<String> {
+pub(crate) fn of(scene: &GaussianScene, format: &Export) -> Vec<String> {
     let mut lost = Vec::new();
     if scene.environment.is_some() {
         lost.push("The environment map is not exported.".to_owned());
@@ -28,6 +30,36 @@ pub(crate) fn of(scene: &GaussianScene) -> Vec<String> {
              direction to where it is."
                 .to_owned(),
         );
+    }
+    if scene.trained_with.mip_filter && !format.has_mip_filter {
+        lost.push(
+            "The capture was trained with the filter of Mip-Splatting, which the files do not say: other programs draw its fine detail \
+             slightly thicker."
+                .to_owned(),
+        );
+    }
+    lost.extend(of_space(scene, format));
+    lost
+}
+
+/// Returns a sentence about the axis that points up, and one about the origin, if other players do not know them.
+fn of_space(scene: &GaussianScene, format: &Export) -> Vec<String> {
+    let (up, Origin { place, time }) = (scene.playback.up, scene.trained_with.origin);
+    let mut lost = Vec::new();
+    if format.has_space && up != UpAxis::NegY {
+        let up = axis(up);
+        lost.push(format!(
+            "{up} points up, which a comment of the file says: other programs than gs4d take -y for it."
+        ));
+    }
+    if !format.has_space && place != [0.0; 3] {
+        let [x, y, z] = place;
+        lost.push(format!(
+            "The origin of the capture, ({x}, {y}, {z}) in the coordinates of its files, is left out: places are relative to it."
+        ));
+    }
+    if format.is_moving() && time != 0.0 {
+        lost.push(format!("The time {time} at which timestamps of the capture begin is left out."));
     }
     lost
 }

@@ -20,7 +20,7 @@ use std::f64::consts::TAU;
 pub(crate) fn moving(scene: &GaussianScene, keeps_filter: bool) -> Result<(Columns, Vec<String>), ExportError> {
     let ready = Ready::of(scene)?;
     let mut lost = Vec::new();
-    let mut columns = Columns::default();
+    let mut columns = Columns { origin: scene.trained_with.origin.place, ..Columns::default() };
     match &scene.filter {
         Some(filter) if keeps_filter => columns.filter = Some(filter.clone()),
         Some(filter) if filter.kind != FilterKind::Support => {

@@ -1,9 +1,14 @@
 //! PLY files of Gaussians: those of 3DGS, and those of `FreeTimeGS` with motion.
 //!
-//! In: [`Columns`]. Out: binary little-endian floats, with the properties of the original trainer in its order.
+//! In: [`Columns`]. Out: binary little-endian floats, with the properties of the original trainer in its order. Places are those of the capture: a comment
+//! says which axis points up, unless it is -y as in files of trainers; and if the capture has an origin, they are those of its files, in double precision.
 
 use super::clip::Clip;
+use crate::codec::checkpoint::options::axis;
 use crate::codec::import::columns::{Columns, Motion};
+use crate::codec::import::ply::axes::UP;
+use crate::codec::import::ply::origin::ORIGIN;
+use crate::scene::UpAxis;
 use std::io::{self, Write};
 
 /// The name, and the default, of the shortest lifespan: lifespans are exported as they are.
@@ -15,11 +20,12 @@ const ALWAYS: f32 = 1e4;
 ///
 /// # Errors
 /// Errors of the writer.
-pub(super) fn write_instant(columns: &Columns, _: &Clip, writer: &mut dyn Write) -> io::Result<()> {
-    write_header(columns, &[], &[], writer)?;
+pub(super) fn write_instant(columns: &Columns, clip: &Clip, writer: &mut dyn Write) -> io::Result<()> {
+    write_header(columns, clip, &[], &[], writer)?;
     let mut record = Vec::new();
     for index in 0..columns.len() {
         record.clear();
+        write_place(columns, index, writer)?;
         push_still(columns, index, &mut record);
         writer.write_all(bytes(&mut record))?;
     }
@@ -44,10 +50,12 @@ pub(super) fn write_moving(columns: &Columns, clip: &Clip, writer: &mut dyn Writ
         "opacity_floor 0".to_owned(),
         format!("n_frames {frames}"),
     ];
-    write_header(columns, &comments, &["time", "log_duration", "velocity_0", "velocity_1", "velocity_2"], writer)?;
+    let more = ["time", "log_duration", "velocity_0", "velocity_1", "velocity_2"];
+    write_header(columns, clip, &comments, &more, writer)?;
     let mut record = Vec::new();
     for (index, &Motion { velocity, mean_t, sigma_t }) in columns.motion.iter().enumerate() {
         record.clear();
+        write_place(columns, index, writer)?;
         push_still(columns, index, &mut record);
         record.push((mean_t - first) / span);
         record.push((sigma_t / span).min(ALWAYS).ln());
@@ -57,15 +65,25 @@ pub(super) fn write_moving(columns: &Columns, clip: &Clip, writer: &mut dyn Writ
     Ok(())
 }
 
-fn write_header(columns: &Columns, comments: &[String], more: &[&str], writer: &mut dyn Write) -> io::Result<()> {
+fn write_header(
+    columns: &Columns,
+    clip: &Clip,
+    comments: &[String],
+    more: &[&str],
+    writer: &mut dyn Write,
+) -> io::Result<()> {
     let mut header = "ply\nformat binary_little_endian 1.0\n".to_owned();
-    for comment in comments {
+    for comment in comments.iter().chain(&space(columns, clip)) {
         header += &format!("comment {comment}\n");
     }
     header += &format!("element vertex {}\n", columns.len());
+    let place = if has_origin(columns) { "double" } else { "float" };
+    for name in ["x", "y", "z"] {
+        header += &format!("property {place} {name}\n");
+    }
     let rest = (columns.harmonics.coefficients - 1) * 3;
     let counted = |stem: &str, count: usize| (0..count).map(|i| format!("{stem}_{i}")).collect::<Vec<_>>();
-    let mut names: Vec<String> = ["x", "y", "z", "nx", "ny", "nz"].map(str::to_owned).into();
+    let mut names: Vec<String> = ["nx", "ny", "nz"].map(str::to_owned).into();
     names.extend(counted("f_dc", 3).into_iter().chain(counted("f_rest", rest)));
     names.push("opacity".to_owned());
     names.extend(counted("scale", 3).into_iter().chain(counted("rot", 4)));
@@ -76,11 +94,34 @@ fn write_header(columns: &Columns, comments: &[String], more: &[&str], writer: &
     writer.write_all((header + "end_header\n").as_bytes())
 }
 
-/// Appends the values that Gaussians at rest have. Coefficients above degree 0 are in the order of the trainer: all of red first.
+/// Returns the comments about the space of a file.
+fn space(columns: &Columns, clip: &Clip) -> Vec<String> {
+    let [x, y, z] = columns.origin;
+    let up = (clip.up != UpAxis::NegY).then(|| format!("{UP} {}", axis(clip.up)));
+    let origin = has_origin(columns).then(|| format!("{ORIGIN} {x} {y} {z}"));
+    up.into_iter().chain(origin).collect()
+}
+
+fn has_origin(columns: &Columns) -> bool {
+    columns.origin != [0.0; 3]
+}
+
+/// Writes the place of a Gaussian in the coordinates of the capture's files.
+fn write_place(columns: &Columns, index: usize, writer: &mut dyn Write) -> io::Result<()> {
+    for (mean, origin) in columns.mean[index].into_iter().zip(columns.origin) {
+        if has_origin(columns) {
+            writer.write_all(&(origin + f64::from(mean)).to_le_bytes())?;
+        } else {
+            writer.write_all(&mean.to_le_bytes())?;
+        }
+    }
+    Ok(())
+}
+
+/// Appends the other values that Gaussians at rest have. Coefficients above degree 0 are in the order of the trainer: all of red first.
 fn push_still(columns: &Columns, index: usize, record: &mut Vec<f32>) {
     let colors = columns.harmonics.of(index);
     let (first, rest) = colors.split_at(3);
-    record.extend(columns.mean[index]);
     record.extend([0.0; 3]);
     record.extend(first);
     for channel in 0..3 {

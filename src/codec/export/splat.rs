@@ -1,8 +1,9 @@
 //! `.splat` files: 32 bytes for each Gaussian at rest, without a header.
 //!
-//! In: [`Columns`]. Out: mean and scales as floats, color and opacity as four bytes, the rotation as four bytes.
+//! In: [`Columns`]. Out: mean and scales as floats, color and opacity as four bytes, the rotation as four bytes; -Y up.
 
 use super::clip::Clip;
+use super::y_up::y_down;
 use crate::codec::import::columns::{Columns, SH_C0};
 use glam::Vec4;
 use std::io::{self, Write};
@@ -11,7 +12,8 @@ use std::io::{self, Write};
 ///
 /// # Errors
 /// Errors of the writer.
-pub(super) fn write(columns: &Columns, _: &Clip, writer: &mut dyn Write) -> io::Result<()> {
+pub(super) fn write(columns: &Columns, clip: &Clip, writer: &mut dyn Write) -> io::Result<()> {
+    let columns = &*y_down(columns, clip.up)?;
     for index in 0..columns.len() {
         let mut record = [0; 32];
         let scale = columns.log_scale[index].map(f32::exp);

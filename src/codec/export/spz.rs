@@ -1,6 +1,7 @@
 //! SPZ files of version 3, which readers of versions 2, 3 and 4 have in common: one stream of gzip.
 //!
-//! In: [`Columns`] at rest. Out: 20 bytes for each Gaussian and one for each further value of its color, before gzip; +Y up.
+//! In: [`Columns`] at rest. Out: 20 bytes for each Gaussian and one for each further value of its color, before gzip; +Y up. Gaussians beyond
+//! [`farthest`] are left out before.
 
 use super::clip::Clip;
 use super::y_up::y_up;
@@ -15,6 +16,30 @@ const LARGEST: f32 = 8_388_607.0;
 
 /// Most binary digits behind the point: the usual number is 12, from a time of larger Gaussians.
 const FRACTIONAL_BITS: u8 = 16;
+
+/// Steps of a position in the size of a usual Gaussian that are fine enough.
+const STEPS: f32 = 4.0;
+/// One of so many Gaussians, or fewer, may be left out so that the others have such steps.
+const FEW: usize = 100;
+
+/// The flag of files trained with the screen-space filter of Mip-Splatting.
+const ANTIALIASED: u8 = 1;
+
+/// Returns the farthest coordinate that a file of these Gaussians holds, capture units: that of 24 bits with steps that are fine enough for the
+/// usual Gaussian. If more than a few are beyond, steps may be as large as 1 unit.
+pub(super) fn farthest(columns: &Columns) -> f32 {
+    let size = |scales: &[f32; 3]| scales.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+    let mut sizes: Vec<f32> = columns.log_scale.iter().map(size).collect();
+    let middle = sizes.len() / 2;
+    if sizes.is_empty() {
+        return LARGEST;
+    }
+    let usual = sizes.select_nth_unstable_by(middle, f32::total_cmp).1.exp();
+    let bits = (STEPS / usual).log2().ceil().clamp(0.0, f32::from(FRACTIONAL_BITS));
+    let limit = LARGEST / bits.exp2();
+    let beyond = columns.mean.iter().filter(|mean| !mean.iter().all(|value| value.abs() <= limit)).count();
+    if beyond * FEW <= columns.len() { limit } else { LARGEST }
+}
 
 /// Writes Gaussians at rest.
 ///
@@ -32,7 +57,8 @@ pub(super) fn write(columns: &Columns, clip: &Clip, writer: &mut dyn Write) -> i
     writer.write_all(b"NGSP")?;
     writer.write_all(&3_u32.to_le_bytes())?;
     writer.write_all(&count.to_le_bytes())?;
-    writer.write_all(&[columns.harmonics.degree as u8, fractional_bits, 0, 0])?;
+    let flags = if columns.mip_filter { ANTIALIASED } else { 0 };
+    writer.write_all(&[columns.harmonics.degree as u8, fractional_bits, flags, 0])?;
     let factor = f32::from(fractional_bits).exp2();
     for value in columns.mean.as_flattened() {
         let fixed = (value * factor).round().clamp(-LARGEST, LARGEST) as i32;
@@ -135,5 +161,29 @@ mod tests {
         columns.mean[0][1] = 1e9;
         let refused = write(&columns, &samples::clip(UpAxis::PosY), &mut Vec::new());
         assert!(refused.is_err(), "a position that 24 bits cannot have");
+    }
+
+    #[test]
+    fn few_far_positions_do_not_take_the_digits_of_the_others() {
+        let with_far = |count: usize, far: usize| {
+            let mut columns = samples::columns(count, 0);
+            columns.log_scale = vec![[-6.0, -4.0, -5.0]; count];
+            columns.mean.iter_mut().take(far).for_each(|mean| mean[2] = -1e6);
+            farthest(&columns)
+        };
+        // e^-4 is 0.018: 4 steps need 8 digits behind the point.
+        assert_eq!(with_far(300, 0), 8_388_607.0 / 256.0, "fine steps");
+        assert_eq!(with_far(300, 3), 8_388_607.0 / 256.0, "3 of 300 are left out");
+        assert_eq!(with_far(300, 4), 8_388_607.0, "more are kept, with coarser steps");
+        assert_eq!(farthest(&Columns::default()), 8_388_607.0, "no Gaussians");
+    }
+
+    #[test]
+    fn the_filter_of_mip_splatting_is_a_flag_of_the_file() {
+        for mip_filter in [false, true] {
+            let columns = Columns { mip_filter, ..samples::columns(3, 0) };
+            let (found, _) = spz::columns(&written(&columns, UpAxis::NegY)).expect("a file");
+            assert_eq!(found.mip_filter, mip_filter, "the flag is read back");
+        }
     }
 }

@@ -4,6 +4,7 @@
 //! one row of [`EXPORTS`]; the function gets [`Columns`], so that it knows neither packed records nor harmonics in time.
 
 pub(crate) use super::clip::Clip;
+use super::error::ExportError;
 use super::{gltf, ply, sog, splat, spz, usd};
 use crate::codec::fourdgs;
 use crate::codec::import::columns::Columns;
@@ -20,6 +21,13 @@ pub struct Export {
     pub extension: &'static str,
     /// What a file holds, and the function that writes it.
     pub(crate) what: What,
+    /// Whether a file has the coordinates of the capture, with its origin and the axis that points up. Files of other formats that have an axis of
+    /// their own are rotated to it.
+    pub(crate) has_space: bool,
+    /// Whether a file says that the capture was trained with the filter of Mip-Splatting.
+    pub(crate) has_mip_filter: bool,
+    /// Returns the farthest coordinate that a file of some Gaussians holds, capture units; those beyond are left out. `None`: it holds all.
+    pub(crate) farthest: Option<fn(&Columns) -> f32>,
     /// What the format cannot hold, whatever the capture: one sentence each.
     pub lost: &'static [&'static str],
 }
@@ -34,10 +42,15 @@ pub(crate) enum What {
     Moving(Writer),
     /// As `Moving`, with the temporal filter of the capture if it has one: its intervals must be written too.
     Windowed(Writer),
+    /// As `Windowed`, encoded before it is written, since only the encoded file shows what it loses.
+    Encoded(Encoder),
 }
 
 /// Writes the file of a format. Colors have time degree 0, opacities are finite logits, quaternions have any length but 0.
 pub(crate) type Writer = fn(&Columns, &Clip, &mut dyn Write) -> io::Result<()>;
+
+/// Encodes the file of a format, and returns a sentence for each thing that it does not hold.
+pub(crate) type Encoder = fn(&Columns, &Clip) -> Result<(Vec<u8>, Vec<String>), ExportError>;
 
 /// What all formats of the SOG family lose.
 const SOG: &str = "Scales and colors have 256 values, rotations 256 for each component, and at most 65,536 sets of coefficients above degree 0 are \
@@ -50,6 +63,9 @@ pub const EXPORTS: &[Export] = &[
         name: "a 3DGS PLY (.ply)",
         extension: "ply",
         what: What::Instant(ply::write_instant),
+        has_space: true,
+        has_mip_filter: false,
+        farthest: None,
         lost: &[],
     },
     Export {
@@ -57,6 +73,9 @@ pub const EXPORTS: &[Export] = &[
         name: "a FreeTimeGS PLY (.ftgs.ply)",
         extension: "ftgs.ply",
         what: What::Moving(ply::write_moving),
+        has_space: true,
+        has_mip_filter: false,
+        farthest: None,
         lost: &["Players of FreeTimeGS have no cut-off: they draw the ends of lifespans that are not drawn here."],
     },
     Export {
@@ -64,6 +83,9 @@ pub const EXPORTS: &[Export] = &[
         name: "a .splat file (.splat)",
         extension: "splat",
         what: What::Instant(splat::write),
+        has_space: false,
+        has_mip_filter: false,
+        farthest: None,
         lost: &[
             "A .splat file has no view-dependent color: the coefficients above degree 0 are left out.",
             "A .splat file has 256 values for each color channel, the opacity and each component of a rotation.",
@@ -74,6 +96,9 @@ pub const EXPORTS: &[Export] = &[
         name: "an SPZ file, version 3 (.spz)",
         extension: "spz",
         what: What::Instant(spz::write),
+        has_space: false,
+        has_mip_filter: true,
+        farthest: Some(spz::farthest),
         lost: &[
             "An SPZ file has 256 values for each color channel, the opacity and each scale, which is from e^-10 to e^5.94.",
             "An SPZ file has 32 values for each coefficient of degree 1 and 16 for each above, from -1 to 1.",
@@ -84,6 +109,9 @@ pub const EXPORTS: &[Export] = &[
         name: "a binary glTF file (.glb)",
         extension: "glb",
         what: What::Instant(gltf::write),
+        has_space: false,
+        has_mip_filter: false,
+        farthest: None,
         lost: &[],
     },
     Export {
@@ -91,6 +119,9 @@ pub const EXPORTS: &[Export] = &[
         name: "an OpenUSD text file (.usda)",
         extension: "usda",
         what: What::Windowed(usd::write),
+        has_space: false,
+        has_mip_filter: false,
+        farthest: None,
         lost: &[],
     },
     Export {
@@ -98,6 +129,9 @@ pub const EXPORTS: &[Export] = &[
         name: "a SOG of PlayCanvas (.sog)",
         extension: "sog",
         what: What::Instant(sog::write_sog),
+        has_space: false,
+        has_mip_filter: false,
+        farthest: None,
         lost: &[SOG],
     },
     Export {
@@ -105,23 +139,29 @@ pub const EXPORTS: &[Export] = &[
         name: "a SOG with motion (.sogst)",
         extension: "sogst",
         what: What::Moving(sog::write_sogst),
+        has_space: false,
+        has_mip_filter: false,
+        farthest: None,
         lost: &[SOG, "A .sogst file has 256 times and 256 lifespans; paths stay exact. Its players have no cut-off."],
     },
     Export {
         id: "4dgs",
         name: "a .4dgs file (.4dgs)",
         extension: "4dgs",
-        what: What::Windowed(fourdgs::write),
-        lost: &[
-            "A .4dgs file has 256 values for each color coefficient, and colors from 0 to 1.",
-            "A .4dgs file does not have the axis that points up.",
-        ],
+        what: What::Encoded(fourdgs::encode),
+        has_space: false,
+        has_mip_filter: false,
+        farthest: None,
+        lost: &[],
     },
     Export {
         id: "usd-frame",
         name: "an OpenUSD text file of one time (.frame.usda)",
         extension: "frame.usda",
         what: What::Instant(usd::write),
+        has_space: false,
+        has_mip_filter: false,
+        farthest: None,
         lost: &[],
     },
 ];

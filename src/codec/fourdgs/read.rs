@@ -3,6 +3,8 @@
 //! In: the bytes of a file. Out: [`Imported`]: its Gaussians with their motion, lifespans and windows of time. Tracks of objects become straight
 //! pieces.
 
+use super::exact::{self, Rests};
+use super::memory;
 use super::tracks::{Tracks, pose};
 use crate::codec::import::columns::{Columns, Motion, Played, coefficient, logit};
 use crate::codec::import::in_pieces::{in_pieces, middle_scale, splitting, statements};
@@ -28,6 +30,7 @@ const MOST_PARTS: u32 = 4096;
 /// A file that is damaged or cut, or of another temporal model than gaussian-birth; invalid options.
 pub(crate) fn read(source: &Source<'_>, options: &ReadOptions) -> Result<Imported, ImportError> {
     options.check()?;
+    memory::check(source.bytes).map_err(|over| ImportError::damaged(format!("its set of Gaussians {over}")))?;
     let reading = fourdgs::ReadOptions { recover_truncated: false, ..fourdgs::ReadOptions::default() };
     let file = fourdgs::stream_reader::read_from(source.bytes, &reading).map_err(error)?;
     if file.summary_crc_ok == Some(false) {
@@ -44,7 +47,7 @@ pub(crate) fn read(source: &Source<'_>, options: &ReadOptions) -> Result<Importe
         marginal_cutoff: (file.header.cutoff as f32).clamp(SMALLEST_CUTOFF, 0.999),
     };
     let set = &file.gaussians;
-    let whole = columns(set)?;
+    let whole = columns(set, source.bytes)?;
     let interval = options.time_interval.unwrap_or(played.time_interval);
     let tracks = Tracks::of(&file.objects);
     let object = |index: usize| set.object_id.as_ref().and_then(|objects| objects.get(index)).copied().unwrap_or(0);
@@ -107,8 +110,8 @@ fn up(file: &Scene) -> UpAxis {
     }
 }
 
-/// Returns the Gaussians of a file, without their windows and tracks.
-fn columns(set: &GaussianSet) -> Result<Columns, ImportError> {
+/// Returns the Gaussians of a file, without their windows and tracks. Their colors are exact if this program wrote the file.
+fn columns(set: &GaussianSet, file: &[u8]) -> Result<Columns, ImportError> {
     let count = set.count();
     let coded = set.sh.as_deref().unwrap_or(&[]);
     let rest = if coded.is_empty() { 0 } else { set.sh_coefficients };
@@ -127,6 +130,8 @@ fn columns(set: &GaussianSet) -> Result<Columns, ImportError> {
     if !is_consistent {
         return Err(ImportError::damaged("its attributes have different numbers of Gaussians"));
     }
+    let rests = exact::rests(file, count, rest * 3)?;
+    let add = |decoded: f64, part: &dyn Fn(&Rests) -> f64| (decoded + rests.as_ref().map_or(0.0, part)) as f32;
     let mut columns = Columns::with_capacity(count, degree);
     columns.mean.extend_from_slice(set.positions.as_chunks().0);
     let scales = set.scales.as_chunks::<3>().0;
@@ -134,11 +139,15 @@ fn columns(set: &GaussianSet) -> Result<Columns, ImportError> {
     columns.rotation.extend(set.rotations.as_chunks::<4>().0.iter().map(|&[x, y, z, w]| [w, x, y, z]));
     for (index, &[red, green, blue, opacity]) in set.colors.as_chunks::<4>().0.iter().enumerate() {
         columns.opacity_logit.push(logit(opacity));
-        columns.harmonics.values.extend([red, green, blue].map(coefficient));
+        for (channel, value) in [red, green, blue].into_iter().enumerate() {
+            let color = add(f64::from(value), &|rests| rests.color(index, channel));
+            columns.harmonics.values.push(coefficient(color));
+        }
         let own = coded.get(index * rest * 3..(index + 1) * rest * 3).unwrap_or(&[]);
         for number in 0..rest {
-            let channels = own.iter().skip(number).step_by(rest);
-            columns.harmonics.values.extend(channels.map(|&byte| sh_coefficient(byte) as f32));
+            for (at, &byte) in own.iter().enumerate().skip(number).step_by(rest) {
+                columns.harmonics.values.push(add(sh_coefficient(byte), &|rests| rests.coefficient(index, at)));
+            }
         }
     }
     columns.motion = (set.motions.as_chunks::<3>().0.iter().zip(&set.mu_t).zip(&set.sigma_t))

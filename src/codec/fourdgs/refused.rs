@@ -2,12 +2,12 @@
 //!
 //! In: a file. Out: an error with the line that builds a command with the feature.
 
+use crate::codec::export::error::ExportError;
 use crate::codec::export::table::Clip;
 use crate::codec::import::columns::Columns;
 use crate::codec::import::source::Source;
 use crate::codec::import::{ImportError, Imported};
 use crate::codec::options::ReadOptions;
-use std::io::{self, Write};
 
 /// Refuses a file.
 ///
@@ -23,8 +23,8 @@ pub(crate) fn read(_: &Source<'_>, _: &ReadOptions) -> Result<Imported, ImportEr
 ///
 /// # Errors
 /// Always.
-pub(crate) fn write(_: &Columns, _: &Clip, _: &mut dyn Write) -> io::Result<()> {
-    Err(io::Error::other(
-        "this build does not write .4dgs files: build with `--features fourdgs`, or use the command gs4d",
+pub(crate) fn encode(_: &Columns, _: &Clip) -> Result<(Vec<u8>, Vec<String>), ExportError> {
+    Err(ExportError::Unsupported(
+        "this build does not write .4dgs files: build with `--features fourdgs`, or use the command gs4d".to_owned(),
     ))
 }

@@ -5,9 +5,11 @@
 use super::error::ImportError;
 use crate::codec::options::ReadOptions;
 use crate::gaussian::{Gaussian, Harmonics, InvalidGaussian, Parameters, SMALLEST_CUTOFF, SliceSettings};
+use crate::scene::near::Lengths;
 use crate::scene::{
     Form, GaussianScene, PlaybackHints, SceneForm, Sliced, TemporalFilter, Trained, TrainedWith, UpAxis,
 };
+use crate::view::RasterFov;
 
 /// Gaussians in columns, one entry for each; capture space.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -26,6 +28,10 @@ pub(crate) struct Columns {
     pub motion: Vec<Motion>,
     /// Segments of time in which each Gaussian is active; all if `None`.
     pub filter: Option<TemporalFilter>,
+    /// The place that means are relative to, in the coordinates of the files.
+    pub origin: [f64; 3],
+    /// Whether they were trained with the screen-space filter of Mip-Splatting.
+    pub mip_filter: bool,
 }
 
 /// Motion and lifespan of a Gaussian.
@@ -68,6 +74,7 @@ impl Played {
         filter: Option<TemporalFilter>,
         options: &ReadOptions,
     ) -> Result<GaussianScene, ImportError> {
+        let Lengths { near, spatial_lr_scale } = Lengths::of(&form);
         let scene = GaussianScene {
             form,
             environment: None,
@@ -76,9 +83,11 @@ impl Played {
                 time_interval: options.time_interval.unwrap_or(self.time_interval),
                 background: options.background.unwrap_or_default(),
                 marginal_cutoff: options.marginal_cutoff.unwrap_or(self.marginal_cutoff),
-                raster_fov: options.raster_fov.unwrap_or_default(),
+                raster_fov: options.raster_fov.unwrap_or(RasterFov::Corrected),
                 cameras: options.cameras.unwrap_or_default(),
                 sh_direction: options.sh_direction.unwrap_or_default(),
+                spatial_lr_scale,
+                near,
                 ..TrainedWith::default()
             },
             playback: PlaybackHints {
@@ -109,6 +118,8 @@ impl Columns {
             },
             motion: Vec::new(),
             filter: None,
+            origin: [0.0; 3],
+            mip_filter: false,
         }
     }
 
@@ -132,7 +143,7 @@ impl Columns {
         {
             return Err(ImportError::damaged("its attributes have different numbers of Gaussians"));
         }
-        let Self { mean, log_scale, rotation, opacity_logit, harmonics, motion, filter } = self;
+        let Self { mean, log_scale, rotation, opacity_logit, harmonics, motion, filter, origin, mip_filter } = self;
         let parameters = Parameters { mean, log_scale, rotation_l: rotation, opacity_logit, ..Parameters::default() };
         let form = if has_motion || filter.is_some() {
             let mut gaussians = parameters.slice(&SliceSettings::default())?;
@@ -145,8 +156,21 @@ impl Columns {
         } else {
             SceneForm::Trained(Trained { parameters, harmonics })
         };
-        played.scene(form, filter, options)
+        let mut scene = played.scene(form, filter, options)?;
+        (scene.trained_with.origin.place, scene.trained_with.mip_filter) = (origin, mip_filter);
+        Ok(scene)
     }
+}
+
+/// Returns whether a scene of `all` parts is drawn with the filter of Mip-Splatting, of which `filtered` were trained with it: if all were. If only some
+/// were, also a sentence, which calls them `parts`.
+pub(crate) fn mip_filter_of(filtered: usize, all: usize, parts: &str) -> (bool, Option<String>) {
+    let is_mixed = filtered > 0 && filtered < all;
+    let sentence = format!(
+        "{filtered} of {all} {parts} were trained with the filter of Mip-Splatting, which is drawn only if all were: their fine detail is \
+         slightly thicker."
+    );
+    (filtered > 0 && filtered == all, is_mixed.then_some(sentence))
 }
 
 /// Returns the logit of an opacity. 0 and 1 become the nearest values with a finite logit, which are drawn alike.

@@ -48,12 +48,22 @@ pub(crate) fn keep_drawable_and(columns: &mut Columns, others: impl FnOnce(&[usi
         return None;
     }
     let kept: Vec<usize> = (0..all).into_par_iter().filter(is_drawable).collect();
-    columns.mean = select(&columns.mean, &kept);
-    columns.log_scale = select(&columns.log_scale, &kept);
-    columns.rotation = select(&columns.rotation, &kept);
-    columns.opacity_logit = select(&columns.opacity_logit, &kept);
+    keep(columns, &kept);
+    others(&kept);
+    let removed = all - kept.len();
+    Some(format!(
+        "{removed} of {all} Gaussians have values that cannot be drawn (not finite, or no rotation); they are left out."
+    ))
+}
+
+/// Keeps the Gaussians with these indices, and removes the others.
+pub(crate) fn keep(columns: &mut Columns, kept: &[usize]) {
+    columns.mean = select(&columns.mean, kept);
+    columns.log_scale = select(&columns.log_scale, kept);
+    columns.rotation = select(&columns.rotation, kept);
+    columns.opacity_logit = select(&columns.opacity_logit, kept);
     if !columns.motion.is_empty() {
-        columns.motion = select(&columns.motion, &kept);
+        columns.motion = select(&columns.motion, kept);
     }
     if let Some(filter) = &columns.filter {
         let kept: Vec<u32> = kept.iter().map(|&index| index as u32).collect();
@@ -61,11 +71,6 @@ pub(crate) fn keep_drawable_and(columns: &mut Columns, others: impl FnOnce(&[usi
     }
     let values = kept.par_iter().flat_map_iter(|&index| columns.harmonics.of(index).iter().copied()).collect();
     columns.harmonics = Harmonics { values, ..columns.harmonics };
-    others(&kept);
-    let removed = all - kept.len();
-    Some(format!(
-        "{removed} of {all} Gaussians have values that cannot be drawn (not finite, or no rotation); they are left out."
-    ))
 }
 
 fn is_direction(quaternion: [f32; 4]) -> bool {

@@ -60,6 +60,8 @@ pub(crate) fn in_pieces(
             .collect(),
         harmonics: Harmonics { values: all.iter().flat_map(color).collect(), ..whole.harmonics },
         filter: Some(pieces.filter),
+        origin: whole.origin,
+        mip_filter: whole.mip_filter,
     }
 }
 

@@ -10,6 +10,7 @@ mod error;
 pub(crate) mod gltf;
 mod imported;
 pub(crate) mod in_pieces;
+pub(crate) mod ksplat;
 pub(crate) mod npz;
 pub(crate) mod placed;
 pub(crate) mod ply;

@@ -1,12 +1,14 @@
 //! Parameters of Dynamic 3D Gaussians (`params.npz`): Gaussians that are tracked from frame to frame.
 //!
-//! In: the bytes of a zip archive of arrays. Out: [`Imported`]: each track in straight pieces that end at frames.
+//! In: the bytes of a zip archive of arrays. Out: [`Imported`]: each track in straight pieces that end at frames. What the arrays unpack to
+//! is limited by the [`Budget`] of the archive.
 
 use super::columns::{Columns, Played, coefficient};
 use super::error::ImportError;
 use super::imported::Imported;
 use super::in_pieces::{in_pieces, middle_scale, splitting, statements};
 use super::source::Source;
+use crate::codec::budget::{Budget, UnpackError};
 use crate::codec::npy::Array;
 use crate::codec::options::{FPS, ReadOptions};
 use crate::codec::start::Start;
@@ -14,19 +16,51 @@ use crate::gaussian::SMALLEST_CUTOFF;
 use crate::scene::pieces::{ALWAYS, Bends, Curve, Piece};
 use crate::scene::{MAX_SEGMENTS, UpAxis};
 use glam::{DVec3, Vec3, Vec4};
-use std::io::{Cursor, Read};
+use std::io::Cursor;
 use zip::ZipArchive;
 
 /// Extensions of these files.
 pub(crate) const EXTENSIONS: &[&str] = &["npz"];
 /// The array of the means, by which the format is recognized.
 const MEANS: &str = "means3D";
-/// Largest number of values that a byte of a compressed entry may stand for.
-const DEFLATED: u64 = 1040;
+/// The way out if an array unpacks to too much.
+const REMEDY: &str = "if it is what it should be, save it uncompressed with numpy.savez";
 
 /// Returns whether a file that starts so has such parameters.
 pub(crate) fn is_of(start: &Start) -> bool {
     start.has_entry(&format!("{MEANS}.npy"))
+}
+
+/// The arrays of a file.
+struct Arrays<'a> {
+    zip: ZipArchive<Cursor<&'a [u8]>>,
+    budget: Budget,
+}
+
+impl<'a> Arrays<'a> {
+    /// Opens a file.
+    ///
+    /// # Errors
+    /// Bytes that are no archive.
+    fn open(bytes: &'a [u8]) -> Result<Self, ImportError> {
+        let zip = ZipArchive::new(Cursor::new(bytes))
+            .map_err(|error| ImportError::damaged(format!("its zip archive is damaged: {error}")))?;
+        Ok(Self { zip, budget: Budget::of(bytes.len() as u64) })
+    }
+
+    /// Unpacks an array.
+    ///
+    /// # Errors
+    /// An array that is not there, is damaged, or unpacks to too many bytes.
+    fn unpack(&mut self, name: &str) -> Result<Vec<u8>, ImportError> {
+        let damaged = |reason: &str| ImportError::damaged(format!("its array {name} {reason}"));
+        let entry = self.zip.by_name(&format!("{name}.npy")).map_err(|_| damaged("is missing or damaged"))?;
+        let length = entry.size();
+        self.budget.unpack_stated(entry, length).map_err(|error| match error {
+            UnpackError::OverBudget(over) => damaged(&format!("{over}: {REMEDY}")),
+            error => damaged(&error.to_string()),
+        })
+    }
 }
 
 /// An array of floating-point numbers in C order.
@@ -43,13 +77,9 @@ impl Floats {
     ///
     /// # Errors
     /// An array that is not there, is damaged, or has values of another type.
-    fn read(archive: &mut ZipArchive<Cursor<&[u8]>>, name: &str) -> Result<Self, ImportError> {
+    fn read(arrays: &mut Arrays, name: &str) -> Result<Self, ImportError> {
         let damaged = |reason: &str| ImportError::damaged(format!("its array {name} {reason}"));
-        let entry = archive.by_name(&format!("{name}.npy")).map_err(|_| damaged("is missing or damaged"))?;
-        // The sizes in the directory may be wrong.
-        let most = entry.size().min(entry.compressed_size().saturating_mul(DEFLATED));
-        let mut bytes = Vec::new();
-        entry.take(most).read_to_end(&mut bytes).map_err(|_| damaged("is damaged: copy the file again"))?;
+        let bytes = arrays.unpack(name)?;
         let array = Array::read(&bytes).ok_or_else(|| damaged("is not a whole array: copy the file again"))?;
         let is_double = match array.kind {
             "<f4" => false,
@@ -100,10 +130,8 @@ impl Floats {
 /// # Errors
 /// A damaged archive; arrays that are missing or do not fit each other; Gaussians that cannot be drawn; invalid options.
 pub(crate) fn read(source: &Source<'_>, options: &ReadOptions) -> Result<Imported, ImportError> {
-    let mut archive = ZipArchive::new(Cursor::new(source.bytes))
-        .map_err(|error| ImportError::damaged(format!("its zip archive is damaged: {error}")))?;
-    let archive = &mut archive;
-    let means = Floats::read(archive, MEANS)?;
+    let arrays = &mut Arrays::open(source.bytes)?;
+    let means = Floats::read(arrays, MEANS)?;
     let [frames, count, 3] = means.shape[..] else {
         let reason = format!("its array {MEANS} has the shape {:?}, not frames x Gaussians x 3", means.shape);
         return Err(ImportError::unsupported(reason));
@@ -117,10 +145,10 @@ pub(crate) fn read(source: &Source<'_>, options: &ReadOptions) -> Result<Importe
             "it has {frames} frames, and at most {MAX_SEGMENTS} are possible"
         )));
     }
-    let rotations = Floats::read(archive, "unnorm_rotations")?.require("unnorm_rotations", &[frames, count, 4])?;
-    let colors = Floats::read(archive, "rgb_colors")?.require("rgb_colors", &[frames, count, 3])?;
-    let opacities = Floats::read(archive, "logit_opacities")?.require("logit_opacities", &[count, 1])?;
-    let scales = Floats::read(archive, "log_scales")?.require("log_scales", &[count, 3])?;
+    let rotations = Floats::read(arrays, "unnorm_rotations")?.require("unnorm_rotations", &[frames, count, 4])?;
+    let colors = Floats::read(arrays, "rgb_colors")?.require("rgb_colors", &[frames, count, 3])?;
+    let opacities = Floats::read(arrays, "logit_opacities")?.require("logit_opacities", &[count, 1])?;
+    let scales = Floats::read(arrays, "log_scales")?.require("log_scales", &[count, 3])?;
     let played = Played {
         up: UpAxis::NegY,
         time_interval: [0.0, 1.0],
@@ -262,5 +290,21 @@ mod tests {
         for length in (0..whole.len()).step_by(11) {
             assert!(read_file(&whole[..length]).is_err(), "cut at {length} bytes");
         }
+    }
+
+    #[test]
+    fn an_array_that_would_fill_the_memory_is_refused_before_it_is_unpacked() {
+        let array = array("1000, 20000, 3", &[0.0; 777], false);
+        let (length, claim) = ((array.len() as u32).to_le_bytes(), 240_000_080_u32);
+        let mut bytes = file(&[("means3D", array)]);
+        let places: Vec<usize> = (0..bytes.len() - 4).filter(|&at| bytes[at..at + 4] == length).collect();
+        assert_eq!(places.len(), 2, "the length stands before the entry and in the directory");
+        for at in places {
+            bytes[at..at + 4].copy_from_slice(&claim.to_le_bytes());
+        }
+        let limit = (128 << 20) + 64 * bytes.len();
+        let error = read_file(&bytes).expect_err("more than the limit").to_string();
+        let parts = ["means3D".to_owned(), claim.to_string(), limit.to_string(), "numpy.savez".to_owned()];
+        assert!(parts.iter().all(|part| error.contains(part)), "array, claim, limit, and the way out: {error}");
     }
 }

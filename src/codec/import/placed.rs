@@ -16,7 +16,7 @@ const ORTHOGONAL: f64 = 1e-5;
 /// Smallest variance of a Gaussian that a map has flattened, relative to its largest.
 const FLATTEST: f64 = 1e-14;
 
-/// Maps Gaussians to another space. Returns whether the colors are exact, too.
+/// Maps Gaussians to another space, which has an origin of its own. Returns whether the colors are exact, too.
 ///
 /// # Errors
 /// A map that is not finite or flattens space.
@@ -29,6 +29,7 @@ pub(crate) fn place(columns: &mut Columns, map: &DAffine3) -> Result<bool, Impor
     if *map == DAffine3::IDENTITY {
         return Ok(true);
     }
+    columns.origin = [0.0; 3];
     columns.mean.par_iter_mut().for_each(|mean| {
         *mean = map.transform_point3(DVec3::from(mean.map(f64::from))).as_vec3().to_array();
     });
@@ -114,7 +115,7 @@ mod tests {
                 values: (0..24_u8).map(|i| f32::from(i) / 24.0).collect(),
             },
             motion: vec![Motion { velocity: [1.0, 0.0, 2.0], mean_t: 0.25, sigma_t: 0.5 }; 2],
-            filter: None,
+            ..Columns::default()
         }
     }
 
@@ -130,7 +131,7 @@ mod tests {
         let stretch = DMat3::from_cols_array(&[2.0, 0.0, 0.0, 0.5, 1.0, 0.0, 0.0, 0.3, -0.25]);
         for (linear, is_exact) in [(turn, true), (turn * mirror, true), (stretch, false), (turn * stretch, false)] {
             let map = DAffine3::from_mat3_translation(linear, DVec3::new(1.0, -2.0, 0.5));
-            let (before, mut after) = (columns(), columns());
+            let (before, mut after) = (columns(), Columns { origin: [5e5, 0.0, 7.0], ..columns() });
             assert_eq!(place(&mut after, &map).expect("a valid map"), is_exact, "whether the colors are exact");
             for ((found, expected), scale) in covariances(&after).iter().zip(covariances(&before)).zip([0.1, 3.0]) {
                 let expected = linear * expected * linear.transpose();
@@ -138,6 +139,7 @@ mod tests {
             }
             let mean = map.transform_point3(DVec3::new(1.0, 2.0, 3.0)).as_vec3().to_array();
             assert_eq!(after.mean[0], mean, "the mean is mapped");
+            assert_eq!(after.origin, [0.0; 3], "the coordinates of the files are left");
             let velocity = (linear * DVec3::new(1.0, 0.0, 2.0)).as_vec3().to_array();
             assert_eq!(after.motion[1].velocity, velocity, "the velocity is mapped without the translation");
         }

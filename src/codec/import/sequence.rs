@@ -1,16 +1,19 @@
 //! A sequence: one file of Gaussians at rest for each frame.
 //!
 //! In: the frames in order, or a folder of numbered PLY files. Out: one scene, in which a temporal filter shows the Gaussians of one frame at a time.
-//! Every frame is exact; nothing is interpolated.
+//! Every frame is exact; nothing is interpolated. A frame is shown until the next one begins: their numbers are times.
 
-use super::columns::{Columns, Played};
+use super::columns::{Columns, Played, mip_filter_of};
 use super::error::ImportError;
 use super::imported::Imported;
 use super::ply;
+use crate::codec::hidden::is_hidden;
+use crate::codec::input::read_regular;
 use crate::codec::options::{FPS, InvalidOption, ReadOptions};
 use crate::codec::text::printable;
 use crate::gaussian::{Harmonics, SMALLEST_CUTOFF};
 use crate::scene::{ActiveSets, FilterKind, MAX_SEGMENTS, TemporalFilter, UpAxis};
+use std::ffi::OsStr;
 use std::io;
 use std::path::Path;
 
@@ -39,12 +42,13 @@ pub(crate) fn read_folder(folder: &Path, options: &ReadOptions) -> Result<Import
     let names = ordered(entries.iter().map(|entry| entry.file_name().to_string_lossy().into_owned()).collect())?;
     let frames = names.into_iter().map(|name| {
         let path = folder.join(&name);
-        Frame { name, bytes: Box::new(move || std::fs::read(path)) }
+        Frame { name, bytes: Box::new(move || read_regular(&path)) }
     });
     read(frames, options)
 }
 
-/// Reads frames of equal length, each of which is a PLY file of Gaussians at rest.
+/// Reads frames, each of which is a PLY file of Gaussians at rest. A frame lasts until that of the next number, the last one as long as one number.
+/// Frames without numbers follow one another.
 ///
 /// # Errors
 /// A frame that cannot be read, by name; more than 65 535 frames, none, invalid options.
@@ -53,30 +57,81 @@ pub(crate) fn read<'a>(
     options: &ReadOptions,
 ) -> Result<Imported, ImportError> {
     options.check()?;
-    let count =
-        u32::try_from(frames.len()).ok().filter(|count| (1..=MAX_SEGMENTS).contains(count)).ok_or_else(|| {
-            ImportError::unsupported(format!("has {} frames; 1 to {MAX_SEGMENTS} can be read", frames.len()))
-        })?;
+    let frames: Vec<Frame<'a>> = frames.collect();
+    let Clock { starts, count, lost } = Clock::of(frames.iter().map(|frame| frame.name.as_str()))?;
     let duration_seconds = count as f32 / options.fps.unwrap_or(FPS);
     if !duration_seconds.is_normal() {
         let reason = format!("{count} frames last {duration_seconds} seconds");
         return Err(InvalidOption { name: "fps", reason }.into());
     }
     let (mut all, mut intervals, mut losses) = (Columns::with_capacity(0, 0), Vec::new(), Losses::default());
-    for (number, frame) in (0..count).zip(frames) {
+    let (mut origin, mut up, mut filtered) = (None, None, 0);
+    let ends = starts.iter().skip(1).copied().chain([count]);
+    for (frame, (&start, end)) in frames.into_iter().zip(starts.iter().zip(ends)) {
         let at = |error: ImportError| at(&frame.name, error);
         let bytes = (frame.bytes)().map_err(|error| at(error.into()))?;
         let mut lost = Vec::new();
-        let columns = ply::still(&bytes, &mut lost).map_err(at)?;
+        let (columns, own_up) = ply::still(&bytes, origin, &mut lost).map_err(at)?;
         losses.add(&frame.name, lost);
-        intervals.resize(intervals.len() + columns.len(), number | number << 16);
+        intervals.resize(intervals.len() + columns.len(), start | (end - 1) << 16);
+        // All frames are in the space of the first.
+        origin = origin.or((columns.len() > 0).then_some(columns.origin));
+        up = up.or(own_up);
+        filtered += usize::from(columns.mip_filter);
         append(&mut all, columns);
     }
+    let (mip_filter, mixed) = mip_filter_of(filtered, starts.len(), "frames");
+    (all.origin, all.mip_filter) = (origin.unwrap_or_default(), mip_filter);
     let sets = ActiveSets::Intervals(intervals);
     all.filter = Some(TemporalFilter { kind: FilterKind::Window, segments: count, count: all.len(), sets });
     let time_interval = [0.0, duration_seconds];
-    let played = Played { up: UpAxis::NegY, time_interval, duration_seconds, marginal_cutoff: SMALLEST_CUTOFF };
-    Ok(Imported { scene: all.into_scene(played, options)?, lost: losses.sentences() })
+    let up = up.unwrap_or(UpAxis::NegY);
+    let played = Played { up, time_interval, duration_seconds, marginal_cutoff: SMALLEST_CUTOFF };
+    let lost = lost.into_iter().chain(mixed).chain(losses.sentences()).collect();
+    Ok(Imported { scene: all.into_scene(played, options)?, lost })
+}
+
+/// When frames begin, in frames after the first.
+#[derive(Debug, PartialEq, Eq)]
+struct Clock {
+    /// The beginning of each frame.
+    starts: Vec<u32>,
+    /// The end of the last frame.
+    count: u32,
+    /// A sentence about numbers that are missing.
+    lost: Option<String>,
+}
+
+impl Clock {
+    /// Returns the times of the frames of these names.
+    ///
+    /// # Errors
+    /// No frames, or more than 65 535.
+    fn of<'n>(names: impl ExactSizeIterator<Item = &'n str>) -> Result<Self, ImportError> {
+        let length = names.len();
+        let files = u32::try_from(length)
+            .ok()
+            .filter(|count| (1..=MAX_SEGMENTS).contains(count))
+            .ok_or_else(|| ImportError::unsupported(format!("has {length} frames; 1 to {MAX_SEGMENTS} can be read")))?;
+        let one_by_one = |lost| Ok(Self { starts: (0..files).collect(), count: files, lost });
+        let numbers: Option<Vec<u64>> = names.map(|name| number(name).map(|(_, number)| number)).collect();
+        let Some(numbers) = numbers.filter(|numbers| numbers.is_sorted_by(|a, b| a < b)) else {
+            return one_by_one(None);
+        };
+        let after_first = |number: &u64| number.saturating_sub(numbers.first().copied().unwrap_or(0));
+        let last = numbers.last().map_or(0, after_first);
+        let Some(count) = u32::try_from(last).ok().filter(|&last| last < MAX_SEGMENTS).map(|last| last + 1) else {
+            return one_by_one(Some(format!(
+                "The numbers of its {files} frames have a range of {last}, more than the {MAX_SEGMENTS} of a capture: the frames follow one another."
+            )));
+        };
+        let starts: Vec<u32> = numbers.iter().map(|number| after_first(number) as u32).collect();
+        let lost = (count > files).then(|| {
+            let missing = count - files;
+            format!("{missing} of {count} frames are missing: in place of each, the frame before it is shown.")
+        });
+        Ok(Self { starts, count, lost })
+    }
 }
 
 /// Returns the error of a frame, with its name.
@@ -98,8 +153,11 @@ pub fn next(name: &str) -> Option<String> {
     Some(format!("{beginning}{:0digits$}{ending}", number.checked_add(1)?))
 }
 
-/// Returns the beginning and the number of a name that a frame may have.
+/// Returns the beginning and the number of a name that a frame may have; a hidden file is none.
 fn number(name: &str) -> Option<(&str, u64)> {
+    if is_hidden(OsStr::new(name)) {
+        return None;
+    }
     let stem = name.strip_suffix(".ply")?;
     let stem = stem.strip_suffix(".compressed").unwrap_or(stem);
     let beginning = stem.trim_end_matches(|c: char| c.is_ascii_digit());
@@ -248,6 +306,61 @@ mod tests {
     }
 
     #[test]
+    fn a_frame_is_shown_until_that_of_the_next_number() {
+        let files = ["f3.ply", "f4.ply", "f7.ply"].map(|name| (name, File::splats(1, 0).little()));
+        let options = ReadOptions { fps: Some(10.0), ..ReadOptions::default() };
+        let Imported { scene, lost } = read(frames(&files).into_iter(), &options).expect("three frames");
+        assert_eq!(scene.trained_with.time_interval, [0.0, 0.5], "numbers 3 to 7 at ten a second");
+        let filter = scene.filter.as_ref().expect("a filter");
+        let shown = |number: u32| {
+            let segment = filter.segment_of((number as f32 + 0.5) / 10.0, [0.0, 0.5]);
+            (0..3).filter(|&index| filter.is_active(segment, index)).collect::<Vec<_>>()
+        };
+        assert_eq!(
+            [0, 1, 2, 3, 4].map(shown),
+            [[0], [1], [1], [1], [2]],
+            "the frame of each number, or the last before"
+        );
+        assert_eq!(lost, ["2 of 5 frames are missing: in place of each, the frame before it is shown."], "it is said");
+
+        let far =
+            ["f1700000000.ply", "f1700000033.ply", "f1700099000.ply"].map(|name| (name, File::splats(1, 0).little()));
+        let Imported { scene, lost } = read(frames(&far).into_iter(), &options).expect("three frames");
+        assert_eq!(scene.filter.as_ref().map(|filter| filter.segments), Some(3), "numbers that count no frames");
+        assert!(lost[0].contains("range of 99000"), "it is said: {lost:?}");
+    }
+
+    #[test]
+    fn all_frames_are_in_the_space_of_the_first() {
+        let at = |origin: &str| {
+            let file =
+                File { comments: vec![format!("gs4d.origin {origin}"), "gs4d.up +z".to_owned()], ..File::splats(1, 0) };
+            file.little()
+        };
+        let files = [("f1.ply", at("1000 0 0")), ("f2.ply", at("2000 0 0"))];
+        let scene = read(frames(&files).into_iter(), &ReadOptions::default()).expect("two frames").scene;
+        assert_eq!(scene.playback.up, UpAxis::PosZ, "the axis of the first");
+        assert_eq!(scene.trained_with.origin.place, [1000.0, 0.0, 0.0], "the origin of the first");
+        let SceneForm::Ready(Form::Sliced(sliced)) = &scene.form else { panic!("the sliced form") };
+        assert_eq!(sliced.gaussians[0].mean, sliced.gaussians[1].mean, "the same place in both frames");
+    }
+
+    #[test]
+    fn frames_are_drawn_with_the_filter_of_mip_splatting_if_all_were_trained_with_it() {
+        let plain = File::splats(1, 0).little();
+        let filtered = File::splats(1, 0).comment("antialiased 1").little();
+        let imported = |second: &[u8]| {
+            let files = [("f1.ply", filtered.clone()), ("f2.ply", second.to_owned())];
+            read(frames(&files).into_iter(), &ReadOptions::default()).expect("two frames")
+        };
+        let all = imported(&filtered);
+        assert!(all.scene.trained_with.mip_filter && all.lost.is_empty(), "both frames: {:?}", all.lost);
+        let some = imported(&plain);
+        assert!(!some.scene.trained_with.mip_filter, "one of two frames");
+        assert!(some.lost[0].starts_with("1 of 2 frames"), "it is stated: {:?}", some.lost);
+    }
+
+    #[test]
     fn a_frame_that_cannot_be_read_is_named() {
         let good = File::splats(1, 0).little();
         let message = refusal(&[("frame_1.ply", good.clone()), ("frame_2.ply", good[..90].to_owned())]);
@@ -259,7 +372,7 @@ mod tests {
         let fails = || Frame { name: "gone.ply".to_owned(), bytes: Box::new(|| Err(io::Error::other("it is gone"))) };
         let message = read([fails()].into_iter(), &ReadOptions::default()).expect_err("it is gone").to_string();
         assert!(message.contains("gone.ply: it is gone"), "a file that cannot be opened: {message}");
-        let lossy = File { comments: vec!["antialiased 1".to_owned()], ..File::splats(1, 0) }.little();
+        let lossy = File::splats(1, 72).little();
         let three = ["a1.ply", "a2.ply", "a3.ply"].map(|name| (name, lossy.clone()));
         let lost = read(frames(&three).into_iter(), &ReadOptions::default()).expect("three frames").lost;
         assert_eq!(lost.len(), 1, "one sentence for all frames: {lost:?}");
@@ -274,6 +387,9 @@ mod tests {
         let names = |names: &[&str]| ordered(names.iter().map(|&name| name.to_owned()).collect());
         let found = names(&["f10.ply", "f9.compressed.ply", "notes.txt", "f007.ply", "model.ply"]);
         assert_eq!(found.expect("a sequence"), ["f007.ply", "f9.compressed.ply", "f10.ply"], "by number, not by name");
+        let found = names(&["._f1.ply", "f1.ply", ".f2.ply", "f2.ply", ".DS_Store", "Thumbs.db"]);
+        assert_eq!(found.expect("a sequence"), ["f1.ply", "f2.ply"], "hidden files are no frames");
+        assert!(!is_sequence(&["._f1.ply", "f1.ply"].map(str::to_owned)), "nor do they make a sequence");
         for (files, reason) in [
             (&["f1.ply"][..], "without a sequence"),
             (&["a.ply", "b.ply"], "without a sequence"),

@@ -2,6 +2,7 @@
 //!
 //! In: bytes in memory, a name, the files beside it. Out: [`Source`], from which each format of `import` reads.
 
+use crate::codec::input::read_regular;
 use std::collections::BTreeMap;
 use std::io;
 use std::path::Path;
@@ -20,9 +21,17 @@ pub(crate) trait Beside {
     /// Returns the bytes of a file.
     ///
     /// # Errors
-    /// A file that is not there or cannot be read; a path that leaves the folder.
+    /// A file that is not there or cannot be read; a folder, a pipe or a device; a path that leaves the folder.
     fn read(&self, name: &str) -> io::Result<Vec<u8>>;
+
+    /// Returns whether there is such a file.
+    fn has(&self, name: &str) -> bool {
+        self.read(name).is_ok()
+    }
 }
+
+/// Files beside a file that is kept while it is read in steps.
+pub(crate) type Others<'a> = Box<dyn Beside + Send + Sync + 'a>;
 
 /// Files in a folder on disk.
 #[derive(Debug, Clone, Copy)]
@@ -30,7 +39,11 @@ pub(crate) struct InFolder<'a>(pub &'a Path);
 
 impl Beside for InFolder<'_> {
     fn read(&self, name: &str) -> io::Result<Vec<u8>> {
-        std::fs::read(self.0.join(checked(name)?)).map_err(|error| named(name, error))
+        read_regular(&self.0.join(checked(name)?)).map_err(|error| named(name, error))
+    }
+
+    fn has(&self, name: &str) -> bool {
+        checked(name).is_ok_and(|name| self.0.join(name).is_file())
     }
 }
 
@@ -46,7 +59,7 @@ impl Beside for InMemory {
 }
 
 /// Returns the name, unless it leads out of the folder.
-fn checked(name: &str) -> io::Result<&str> {
+pub(crate) fn checked(name: &str) -> io::Result<&str> {
     let is_inside = !name.is_empty()
         && !name.contains(['\\', ':', '\0'])
         && name.split('/').all(|part| !part.is_empty() && part != "..");
@@ -61,7 +74,8 @@ fn checked(name: &str) -> io::Result<&str> {
     }
 }
 
-fn named(name: &str, error: io::Error) -> io::Error {
+/// Returns the error of a file with its name.
+pub(crate) fn named(name: &str, error: io::Error) -> io::Error {
     io::Error::new(error.kind(), format!("{}, which the file names: {error}", name.escape_debug()))
 }
 
@@ -78,5 +92,21 @@ mod tests {
             assert_eq!(found.kind(), io::ErrorKind::InvalidInput, "{name} leaves the folder: {found}");
         }
         assert_eq!(files.read("c").expect_err("absent").kind(), io::ErrorKind::NotFound, "a file that is not there");
+        assert!(files.has("a/b.webp") && !files.has("c"), "which files there are");
+    }
+
+    #[test]
+    fn of_a_folder_only_files_are_read() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        std::fs::write(folder.path().join("a.bin"), [1]).expect("the folder can be written to");
+        std::fs::create_dir(folder.path().join("b")).expect("the folder can be written to");
+        let files = InFolder(folder.path());
+        assert_eq!(files.read("a.bin").expect("a file"), [1], "a file");
+        assert!(
+            files.has("a.bin") && !files.has("b") && !files.has("c") && !files.has("../x"),
+            "which files there are"
+        );
+        let message = files.read("b").expect_err("a folder").to_string();
+        assert!(message.starts_with("b, which the file names: ") && message.contains("is a folder"), "{message}");
     }
 }

@@ -7,6 +7,7 @@ use super::cubic::{Bend, imported, sigma_of_width, spacetime_clip};
 use super::error::ImportError;
 use super::imported::Imported;
 use super::source::Source;
+use crate::codec::json;
 use crate::codec::options::ReadOptions;
 use crate::codec::start::Start;
 use half::f16;
@@ -40,8 +41,8 @@ pub(crate) fn read(source: &Source<'_>, options: &ReadOptions) -> Result<Importe
     let rest = source.bytes.strip_prefix(&MAGIC).ok_or_else(cut)?;
     let (length, rest) = rest.split_first_chunk::<4>().ok_or_else(cut)?;
     let (description, mut data) = rest.split_at_checked(u32::from_le_bytes(*length) as usize).ok_or_else(cut)?;
-    let parts: Vec<Part> = serde_json::from_slice(description)
-        .map_err(|error| ImportError::damaged(format!("its description is damaged: {error}")))?;
+    let parts: Vec<Part> = json::parse(description)
+        .map_err(|reason| ImportError::damaged(format!("its description is damaged: {reason}")))?;
     for Part { r#type, size } in parts {
         let length = usize::try_from(size).unwrap_or(usize::MAX).min(data.len());
         let (own, others) = data.split_at(length);

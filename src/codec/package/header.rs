@@ -12,6 +12,7 @@ use crate::scene::{
     ActiveSets, ColorDegrees, FilterKind, Form, GaussianScene, PackedColors, PackedScene, PlaybackHints, SceneForm,
     TemporalFilter, Trained, TrainedWith,
 };
+use crate::view::NEAR;
 use serde::{Deserialize, Serialize};
 
 /// The header of a package. Fields that a reader does not know are ignored.
@@ -119,7 +120,7 @@ pub struct StoredFilter {
 }
 
 /// Names of the features that packages of this version may require.
-const FEATURES: [&str; 3] = ["packed", "filter", "cutoff"];
+const FEATURES: [&str; 5] = ["packed", "filter", "cutoff", "near", "mip_filter"];
 
 /// Size of an environment map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -142,8 +143,10 @@ impl Header {
     pub(super) fn of(scene: &GaussianScene) -> Self {
         let form = StoredForm::of(&scene.form);
         let ColorDegrees { coefficients, degree, degree_t } = scene.form.color_degrees();
-        let is_cut_elsewhere = scene.trained_with.marginal_cutoff != MARGINAL_CUTOFF;
-        let used = [matches!(form, StoredForm::Packed { .. }), scene.filter.is_some(), is_cut_elsewhere];
+        let TrainedWith { marginal_cutoff, near, mip_filter, .. } = scene.trained_with;
+        let is_packed = matches!(form, StoredForm::Packed { .. });
+        let is_cut_elsewhere = marginal_cutoff != MARGINAL_CUTOFF;
+        let used = [is_packed, scene.filter.is_some(), is_cut_elsewhere, near != NEAR, mip_filter];
         let requires = FEATURES.iter().zip(used).filter(|(_, used)| *used).map(|(name, _)| (*name).to_owned());
         Self {
             generator: concat!("bevy_gs4d ", env!("CARGO_PKG_VERSION")).to_owned(),

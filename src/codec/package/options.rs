@@ -13,20 +13,13 @@ use crate::scene::GaussianScene;
 pub(super) fn apply(options: &ReadOptions, scene: &mut GaussianScene) -> Result<(), InvalidOption> {
     let stored = &mut scene.trained_with;
     let differs = [
-        ("time interval", "time-interval", options.time_interval.is_some_and(|given| given != stored.time_interval)),
-        (
-            "rotation convention",
-            "rotation-convention",
-            options.rotation_convention.is_some_and(|given| given != stored.rotation_convention),
-        ),
-        ("force SH 3D", "force-sh-3d", options.force_sh_3d.is_some_and(|given| given != stored.force_sh_3d)),
-        (
-            "prefilter variance",
-            "prefilter-var",
-            options.prefilter_var.is_some_and(|given| given != stored.prefilter_var),
-        ),
+        ("time_interval", options.time_interval.is_some_and(|given| given != stored.time_interval)),
+        ("rotation_convention", options.rotation_convention.is_some_and(|given| given != stored.rotation_convention)),
+        ("force_sh_3d", options.force_sh_3d.is_some_and(|given| given != stored.force_sh_3d)),
+        ("prefilter_var", options.prefilter_var.is_some_and(|given| given != stored.prefilter_var)),
     ];
-    if let Some((name, argument, _)) = differs.into_iter().find(|(_, _, differs)| *differs) {
+    if let Some((name, _)) = differs.into_iter().find(|(_, differs)| *differs) {
+        let argument = name.replace('_', "-");
         let remedy = format!("convert its checkpoint again, with gs4d convert --{argument}");
         return Err(InvalidOption { name, reason: format!("the package was made with another value; {remedy}") });
     }
@@ -83,13 +76,13 @@ mod tests {
     fn options_that_contradict_the_stored_gaussians_are_refused() {
         let none = ReadOptions::default();
         for (name, options) in [
-            ("time interval", ReadOptions { time_interval: Some([0.0, 2.0]), ..none.clone() }),
+            ("time_interval", ReadOptions { time_interval: Some([0.0, 2.0]), ..none.clone() }),
             (
-                "rotation convention",
+                "rotation_convention",
                 ReadOptions { rotation_convention: Some(RotationConvention::Unflipped), ..none.clone() },
             ),
-            ("force SH 3D", ReadOptions { force_sh_3d: Some(true), ..none.clone() }),
-            ("prefilter variance", ReadOptions { prefilter_var: Some(0.5), ..none.clone() }),
+            ("force_sh_3d", ReadOptions { force_sh_3d: Some(true), ..none.clone() }),
+            ("prefilter_var", ReadOptions { prefilter_var: Some(0.5), ..none.clone() }),
         ] {
             let mut scene = scene();
             let error = apply(&options, &mut scene).expect_err("the stored value is another");

@@ -1,10 +1,46 @@
 //! EXR pictures in the colors that datasets have.
 //!
-//! In: linear light, multiplied by alpha, in single precision. Out: sRGB-encoded colors, not multiplied by alpha, with 8 bits.
+//! In: linear light, multiplied by alpha, in single precision. Out: sRGB-encoded colors, not multiplied by alpha, with 8 bits. In: an error of the
+//! decoder. Out: the fault and the remedy.
 
 use crate::view::srgb;
 use glam::{Vec3, Vec4};
-use image::{DynamicImage, Rgba, RgbaImage};
+use image::error::{DecodingError, ImageFormatHint};
+use image::{DynamicImage, ImageError, ImageFormat, Rgba, RgbaImage};
+use std::error::Error;
+
+/// What the decoder says of a picture without the channels R, G and B, or with lists of values for each pixel.
+const NO_RGB: &str = "image does not contain non-deep rgb channels";
+/// What it says of a file that ends too early.
+const CUT: &str = "invalid: reference to missing bytes";
+
+/// Returns an error of the decoder of EXR with a sentence in place of the decoder's words. Other errors are unchanged.
+pub(super) fn in_words(error: ImageError) -> ImageError {
+    let hint = ImageFormatHint::Exact(ImageFormat::OpenExr);
+    let said = match &error {
+        ImageError::Decoding(decoding) if decoding.format_hint() == hint => decoding.source().map(ToString::to_string),
+        _ => None,
+    };
+    said.map_or(error, |said| ImageError::Decoding(DecodingError::new(hint, sentence(&said))))
+}
+
+/// Returns the fault and the remedy for what the decoder says.
+fn sentence(said: &str) -> String {
+    if said == NO_RGB {
+        return "it has no channels R, G and B with one value for each pixel (it may be gray, of depths, or \"deep\"): save it as RGB or RGBA"
+            .to_owned();
+    }
+    if said == CUT {
+        return "it ends too early: copy it again".to_owned();
+    }
+    match (said.strip_prefix("not supported: "), said.strip_prefix("invalid: ")) {
+        (Some(part), _) => {
+            format!("it needs what the decoder does not have ({part}): save it as RGB or RGBA with the compression ZIP")
+        }
+        (None, Some(part)) => format!("it is damaged ({part}): copy it again"),
+        (None, None) => format!("it cannot be decoded ({said}): copy it again, or save it as PNG"),
+    }
+}
 
 /// Encodes the colors. Light above 1 becomes white; what is not a number becomes 0.
 pub(super) fn displayed(image: DynamicImage) -> DynamicImage {
@@ -17,4 +53,27 @@ pub(super) fn displayed(image: DynamicImage) -> DynamicImage {
         Rgba(color.extend(alpha).to_array().map(|value| (255.0 * value).round() as u8))
     };
     DynamicImage::ImageRgba8(RgbaImage::from_fn(linear.width(), linear.height(), pixel))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_of_the_decoder_become_sentences() {
+        let error = |format: ImageFormat, said: &str| {
+            in_words(ImageError::Decoding(DecodingError::new(format.into(), said.to_owned()))).to_string()
+        };
+        for (said, part) in [
+            (NO_RGB, "save it as RGB or RGBA"),
+            (CUT, "it ends too early: copy it again"),
+            ("invalid: not enough data", "it is damaged (not enough data): copy it again"),
+            ("not supported: unknown compression method", "(unknown compression method): save it as"),
+            ("cancelled", "(cancelled)"),
+        ] {
+            let found = error(ImageFormat::OpenExr, said);
+            assert!(found.contains(part), "{part:?} is not in: {found}");
+        }
+        assert!(error(ImageFormat::Png, CUT).ends_with(CUT), "another format");
+    }
 }

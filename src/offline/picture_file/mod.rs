@@ -3,14 +3,17 @@
 //! In: a path, and the largest size that the picture may have. Out: the picture, or a [`PictureError`] that names the file, the reason and the
 //! remedy.
 //!
-//! The size is compared before decoding, so that a small file cannot take much time and memory. A JPEG must be complete, which its decoder does
-//! not check (`jpeg`).
+//! The size is compared before decoding, with the expected one and with the [`Budget`] of the file, so that a small file cannot take much time and
+//! memory. Of a PNG the decoder gets only the chunks that change pixels (`png`); of an EXR all channels count (`exr_size`). A JPEG must be complete,
+//! which its decoder does not check (`jpeg`).
 
 mod exr;
+mod exr_size;
 mod huffman;
 mod jpeg;
 mod png;
 
+use crate::codec::budget::Budget;
 use glam::UVec2;
 use image::error::DecodingError;
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
@@ -64,6 +67,16 @@ pub enum PictureError {
         /// The largest width and height accepted.
         largest: UVec2,
     },
+    /// The picture would take more memory than a picture of so few bytes may take.
+    #[error("{}: the picture, {} x {} pixels, {reason}: scale it, or save it uncompressed", .path.display(), .size.x, .size.y)]
+    TooMuch {
+        /// The file.
+        path: PathBuf,
+        /// Width and height of the picture, pixels.
+        size: UVec2,
+        /// What it takes, and the limit.
+        reason: String,
+    },
     /// The picture, or its file, is larger than the limit for all pictures.
     #[error("{}: a picture of more than {MAX_PIXELS} pixels or {MAX_BYTES} bytes is not decoded: scale it", .path.display())]
     FarTooLarge {
@@ -77,9 +90,10 @@ pub enum PictureError {
 /// # Errors
 /// A file that cannot be read or is not a picture, a picture whose width or height is larger than that of `largest`.
 pub fn size(path: &Path, largest: UVec2) -> Result<UVec2, PictureError> {
-    let bytes = read(path)?;
+    let (bytes, _) = read(path)?;
     let decoder = reader(path, &bytes)?.into_decoder();
-    let decoder = decoder.map_err(|reason| PictureError::Format { path: path.to_owned(), reason })?;
+    let decoder =
+        decoder.map_err(|reason| PictureError::Format { path: path.to_owned(), reason: exr::in_words(reason) })?;
     checked_size(path, &decoder, largest)
 }
 
@@ -88,12 +102,12 @@ pub fn size(path: &Path, largest: UVec2) -> Result<UVec2, PictureError> {
 /// # Errors
 /// As [`size`], and a picture that is damaged or not complete.
 pub fn open(path: &Path, largest: UVec2) -> Result<DynamicImage, PictureError> {
-    let failed = |reason| PictureError::Format { path: path.to_owned(), reason };
-    let bytes = read(path)?;
+    let failed = |reason| PictureError::Format { path: path.to_owned(), reason: exr::in_words(reason) };
+    let (bytes, length) = read(path)?;
     let reader = reader(path, &bytes)?;
     let format = reader.format();
     let decoder = reader.into_decoder().map_err(failed)?;
-    checked_size(path, &decoder, largest)?;
+    let size = checked_size(path, &decoder, largest)?;
     if format == Some(ImageFormat::Jpeg) {
         jpeg::check(&bytes).map_err(|reason| PictureError::Incomplete { path: path.to_owned(), reason })?;
     }
@@ -101,18 +115,25 @@ pub fn open(path: &Path, largest: UVec2) -> Result<DynamicImage, PictureError> {
         let error = DecodingError::new(ImageFormat::Png.into(), "its palette has an incomplete color");
         return Err(failed(ImageError::Decoding(error)));
     }
+    let channels = if format == Some(ImageFormat::OpenExr) { exr_size::unpacked(&bytes) } else { 0 };
+    let taken = Budget::of(length).take(decoder.total_bytes().max(channels));
+    taken.map_err(|over| PictureError::TooMuch { path: path.to_owned(), size, reason: over.to_string() })?;
     Limits::default().reserve(decoder.total_bytes()).map_err(failed)?;
     let image = DynamicImage::from_decoder(decoder).map_err(failed)?;
     Ok(if format == Some(ImageFormat::OpenExr) { exr::displayed(image) } else { image })
 }
 
-/// Reads a file of limited length.
-fn read(path: &Path) -> Result<Vec<u8>, PictureError> {
+/// Reads what the decoder needs of a file of limited length, which is returned, too.
+fn read(path: &Path) -> Result<(Vec<u8>, u64), PictureError> {
     let mut bytes = Vec::new();
     let file = File::open(path).and_then(|file| file.take(MAX_BYTES + 1).read_to_end(&mut bytes));
+    let length = bytes.len() as u64;
     match file {
-        Ok(_) if bytes.len() as u64 > MAX_BYTES => Err(PictureError::FarTooLarge { path: path.to_owned() }),
-        Ok(_) => Ok(bytes),
+        Ok(_) if length > MAX_BYTES => Err(PictureError::FarTooLarge { path: path.to_owned() }),
+        Ok(_) => {
+            png::remove_others(&mut bytes);
+            Ok((bytes, length))
+        }
         Err(reason) => Err(PictureError::Read { path: path.to_owned(), reason }),
     }
 }

@@ -178,13 +178,17 @@ fn a_tsog_of_another_profile_or_timeline_is_refused() {
         (json!({ "timeline": { "type": 0, "N": 65536, "delta": 1, "files": files } }), "65536 frames"),
         (json!({ "timeline": { "type": 0, "N": 5, "delta": 5, "files": files } }), "delta"),
         (json!({ "timeline": { "type": 1, "files": files } }), "without mins and maxs"),
-        (json!({ "timeline": timeline, "playback": { "duration": -1 } }), "duration of -1"),
+        (json!({ "timeline": timeline, "playback": { "duration": -1 } }), "--duration sets another"),
         (json!({ "timeline": timeline, "temporal": { "scales": {} } }), "scales"),
         (json!({ "temporal": { "means": { "mins": [[0, 0, 0]], "maxs": [[1, 1, 1]], "files": [] } } }), "timeline"),
     ] {
         let message = read(&tsog(fields.clone())).expect_err("refused");
         assert!(message.contains(expected), "{fields}: the message says \"{expected}\": {message}");
     }
+    let bytes = tsog(json!({ "timeline": timeline, "playback": { "duration": -1 } }));
+    let options = ReadOptions { duration_seconds: Some(2.5), ..ReadOptions::default() };
+    let found = sog::read(&Source { bytes: &bytes, beside: &InMemory::default() }, &options).expect("with a duration");
+    assert_eq!(found.scene.playback.duration_seconds, 2.5, "the remedy works");
 }
 
 #[test]

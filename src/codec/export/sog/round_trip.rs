@@ -59,7 +59,7 @@ fn clip() -> Clip {
 
 pub(super) fn written(id: &str, columns: &Columns) -> Vec<u8> {
     let export = Export::of_id(id).expect("in the table");
-    let (What::Instant(write) | What::Moving(write) | What::Windowed(write)) = export.what;
+    let (What::Instant(write) | What::Moving(write)) = export.what else { panic!("{id} is written from columns") };
     let mut bytes = Vec::new();
     write(columns, &clip(), &mut bytes).expect("memory can be written");
     bytes

@@ -21,12 +21,14 @@ pub(super) struct Container<'a> {
     pub binary: Option<&'a [u8]>,
 }
 
-/// Returns whether a file that starts so is a glTF file. Of text only the name of the file, or an early mention of the extension, tells.
+/// Keys of which a document has some, beside `asset`.
+const KEYS: [&str; 6] = ["\"accessors\"", "\"bufferViews\"", "\"buffers\"", "\"meshes\"", "\"nodes\"", "\"scenes\""];
+
+/// Returns whether a file that starts so is a glTF file. Of text the name of the file, an early mention of the extension, or the keys of glTF tell.
 pub(crate) fn is_of(start: &Start) -> bool {
-    let is_object = start.bytes.iter().find(|byte| !byte.is_ascii_whitespace()) == Some(&b'{');
-    let mentions = |word: &[u8]| start.bytes.windows(word.len()).any(|window| window == word);
-    start.bytes.starts_with(MAGIC)
-        || (is_object && (start.extension == "gltf" || mentions(b"\"KHR_gaussian_splatting\"")))
+    let has_keys = || start.mentions("\"asset\"") && KEYS.iter().any(|key| start.mentions(key));
+    let is_text = || start.extension == "gltf" || start.mentions("\"KHR_gaussian_splatting\"") || has_keys();
+    start.bytes.starts_with(MAGIC) || (start.is_object() && is_text())
 }
 
 impl<'a> Container<'a> {

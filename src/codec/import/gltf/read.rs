@@ -10,11 +10,12 @@ use super::document::Document;
 use super::nodes::placed;
 use super::primitive::{ColorSpace, checked, columns, has_log_scales, splats};
 use crate::codec::import::Imported;
-use crate::codec::import::columns::{Columns, Played};
+use crate::codec::import::columns::{Columns, Played, mip_filter_of};
 use crate::codec::import::drawable::keep_drawable;
 use crate::codec::import::error::ImportError;
 use crate::codec::import::placed::place;
 use crate::codec::import::source::Source;
+use crate::codec::json;
 use crate::codec::options::ReadOptions;
 use crate::scene::UpAxis;
 
@@ -37,8 +38,8 @@ const NUMBERS_PER_BYTE: usize = 16;
 /// A file that is damaged, without Gaussians, or that needs what is not read here; invalid options.
 pub(crate) fn read(source: &Source<'_>, options: &ReadOptions) -> Result<Imported, ImportError> {
     let container = Container::of(source.bytes)?;
-    let document: Document = serde_json::from_slice(container.json)
-        .map_err(|error| ImportError::damaged(format!("the JSON of the glTF file: {error}")))?;
+    let document: Document = json::parse(container.json)
+        .map_err(|reason| ImportError::damaged(format!("the JSON of the glTF file cannot be read: {reason}")))?;
     for name in &document.extensions_required {
         if !KNOWN.contains(&&**name) && !HARMLESS.iter().any(|known| name.starts_with(known)) {
             return Err(ImportError::unsupported(format!(
@@ -56,7 +57,10 @@ pub(crate) fn read(source: &Source<'_>, options: &ReadOptions) -> Result<Importe
     let accessors = Accessors { document: &document, buffers };
     let mut lost = Vec::new();
     let parts = parts(&accessors, &mut lost)?;
-    let mut columns = joined(parts);
+    let filtered = parts.iter().filter(|part| part.mip_filter).count();
+    let (mip_filter, mixed) = mip_filter_of(filtered, parts.len(), "primitives");
+    lost.extend(mixed);
+    let mut columns = Columns { mip_filter, ..joined(parts) };
     lost.extend(keep_drawable(&mut columns));
     Ok(Imported { scene: columns.into_scene(Played::still(UpAxis::PosY), options)?, lost })
 }
@@ -377,8 +381,16 @@ mod tests {
         let extension = json!({"extensions": {"KHR_gaussian_splatting_compression_spz_2": {"bufferView": 0}}});
         document["meshes"][0]["primitives"][0]["extensions"]["KHR_gaussian_splatting"] = extension;
         document["extensionsRequired"] = json!(["KHR_gaussian_splatting_compression_spz_2"]);
-        let found = imported(&binary(&document, &buffer), &InMemory::default()).expect("an SPZ file inside");
-        assert_eq!(trained(found).parameters.mean, [[1.0, 0.0, 0.0]], "one Gaussian on the axis");
+        let flags = buffer.len() - spz.len() + 14;
+        for (flag, mip_filter) in [(0, false), (1, true)] {
+            buffer[flags] = flag;
+            let found = imported(&binary(&document, &buffer), &InMemory::default()).expect("an SPZ file inside");
+            assert_eq!(
+                found.scene.trained_with.mip_filter, mip_filter,
+                "the filter of Mip-Splatting is that of the file"
+            );
+            assert_eq!(trained(found).parameters.mean, [[1.0, 0.0, 0.0]], "one Gaussian on the axis");
+        }
     }
 
     #[test]

@@ -2,8 +2,9 @@
 //!
 //! In: the tables `chunk`, `vertex` and, for view-dependent color, `sh`. Out: [`Columns`] of Gaussians at rest.
 
+use super::origin::{Places, place};
 use super::splats::{degree, rows};
-use super::table::{Table, row};
+use super::table::{Column, Table, row};
 use crate::codec::import::columns::{Columns, coefficient, logit};
 use crate::codec::import::error::ImportError;
 use crate::gaussian::Harmonics;
@@ -13,11 +14,16 @@ use std::f32::consts::SQRT_2;
 /// Gaussians of a chunk.
 const CHUNK: usize = 256;
 
-/// Reads Gaussians at rest.
+/// Reads Gaussians at rest, with the origin that is given or follows from their places; sentences about these are added to `lost`.
 ///
 /// # Errors
 /// Chunks, or colors, of another number of Gaussians; a property that is missing.
-pub(super) fn columns(tables: &[Table<'_>], vertex: &Table<'_>) -> Result<Columns, ImportError> {
+pub(super) fn columns(
+    tables: &[Table<'_>],
+    vertex: &Table<'_>,
+    origin: Option<[f64; 3]>,
+    lost: &mut Vec<String>,
+) -> Result<Columns, ImportError> {
     let named = |name: &str| tables.iter().find(|table| table.name == name);
     let chunk = named("chunk").ok_or_else(|| ImportError::damaged("is a compressed PLY without its element chunk"))?;
     let (count, chunks) = (vertex.len(), chunk.len());
@@ -28,19 +34,54 @@ pub(super) fn columns(tables: &[Table<'_>], vertex: &Table<'_>) -> Result<Column
     let high = chunk.all(["max_x", "max_y", "max_z"])?;
     let scale_low = chunk.all(["min_scale_x", "min_scale_y", "min_scale_z"])?;
     let scale_high = chunk.all(["max_scale_x", "max_scale_y", "max_scale_z"])?;
+    let [position, rotation, scale, color] =
+        vertex.all(["packed_position", "packed_rotation", "packed_scale", "packed_color"])?;
+    let in_box = |word: u32, low: [f32; 3], high: [f32; 3]| -> [f32; 3] {
+        let parts = parts(word);
+        std::array::from_fn(|axis| low[axis] + parts[axis] * (high[axis] - low[axis]))
+    };
+    let log_scale =
+        rows(vertex, |index| in_box(scale.u32(index), row(&scale_low, index / CHUNK), row(&scale_high, index / CHUNK)));
+    let at = |index: usize| -> [f64; 3] {
+        let parts = parts(position.u32(index)).map(f64::from);
+        let (low, high) = (place(&low, index / CHUNK), place(&high, index / CHUNK));
+        std::array::from_fn(|axis| low[axis] + parts[axis] * (high[axis] - low[axis]))
+    };
+    let places = Places { count, is_double: low.iter().all(Column::is_double), at: &at };
+    let origin = places.origin(&log_scale, origin, lost);
+    Ok(Columns {
+        mean: rows(vertex, |index| match origin == [0.0; 3] {
+            true => in_box(position.u32(index), row(&low, index / CHUNK), row(&high, index / CHUNK)),
+            false => places.mean(index, origin),
+        }),
+        log_scale,
+        rotation: rows(vertex, |index| quaternion(rotation.u32(index))),
+        opacity_logit: rows(vertex, |index| logit(bytes(color.u32(index))[3])),
+        harmonics: harmonics(tables, chunk, color, count)?,
+        origin,
+        ..Columns::default()
+    })
+}
+
+/// Reads the colors of `count` Gaussians: red, green and blue in a word, in the boxes of the chunks if there are any; higher degrees in a table of
+/// their own.
+fn harmonics(
+    tables: &[Table<'_>],
+    chunk: &Table<'_>,
+    color: Column<'_>,
+    count: usize,
+) -> Result<Harmonics, ImportError> {
     // Files before the boxes of colors have colors from 0 to 1.
     let colors = if chunk.has("min_r") {
         Some((chunk.all(["min_r", "min_g", "min_b"])?, chunk.all(["max_r", "max_g", "max_b"])?))
     } else {
         None
     };
-    let [position, rotation, scale, color] =
-        vertex.all(["packed_position", "packed_rotation", "packed_scale", "packed_color"])?;
-
-    let (stored, degree) = named("sh").map_or(Ok((0, 0)), |sh| degree(sh.counted("f_rest")))?;
+    let sh = tables.iter().find(|table| table.name == "sh");
+    let (stored, degree) = sh.map_or(Ok((0, 0)), |sh| degree(sh.counted("f_rest")))?;
     let coefficients = (degree as usize + 1).pow(2);
     let mut rest = Vec::new();
-    if let Some(sh) = named("sh") {
+    if let Some(sh) = sh {
         if sh.len() != count {
             return Err(ImportError::damaged(format!("has {} rows of colors, but {count} Gaussians", sh.len())));
         }
@@ -65,20 +106,7 @@ pub(super) fn columns(tables: &[Table<'_>], vertex: &Table<'_>) -> Result<Column
             }
         }
     });
-    let in_box = |word: u32, low: [f32; 3], high: [f32; 3]| {
-        let parts = parts(word);
-        std::array::from_fn(|axis| low[axis] + parts[axis] * (high[axis] - low[axis]))
-    };
-    Ok(Columns {
-        mean: rows(vertex, |index| in_box(position.u32(index), row(&low, index / CHUNK), row(&high, index / CHUNK))),
-        log_scale: rows(vertex, |index| {
-            in_box(scale.u32(index), row(&scale_low, index / CHUNK), row(&scale_high, index / CHUNK))
-        }),
-        rotation: rows(vertex, |index| quaternion(rotation.u32(index))),
-        opacity_logit: rows(vertex, |index| logit(bytes(color.u32(index))[3])),
-        harmonics: Harmonics { coefficients, degree, degree_t: 0, values },
-        ..Columns::default()
-    })
+    Ok(Harmonics { coefficients, degree, degree_t: 0, values })
 }
 
 /// Returns three parts of 1, in 11, 10 and 11 bits.

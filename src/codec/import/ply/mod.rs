@@ -2,18 +2,23 @@
 //!
 //! In: the bytes of a file. Out: its scene. `header` and `body` read PLY as such, into a [`Table`] for each element; `layout` recognizes the trainer or
 //! tool by the names of the properties; `splats`, `compressed`, `moving`, `spacetime` and `rotated` read one layout each, or some that differ in names alone.
+//! `deltas` adds frames of motion, `origin` and `axes` find where the places of a file are, `unread` names what is not read.
 
+pub(crate) mod axes;
 mod body;
 mod compressed;
+mod deltas;
 mod header;
 mod layout;
 mod moving;
-mod read;
+pub(crate) mod origin;
+pub(crate) mod read;
 mod rotated;
 mod scalar;
 mod spacetime;
 mod splats;
 pub(crate) mod table;
+mod unread;
 
 #[cfg(test)]
 pub(crate) mod fixture;
@@ -21,6 +26,4 @@ pub(crate) mod fixture;
 mod tests;
 
 pub(crate) use header::is_ply;
-#[cfg(feature = "offline")]
-pub(crate) use read::vertices;
 pub(crate) use read::{read, still};

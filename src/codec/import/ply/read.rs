@@ -6,7 +6,7 @@ use super::body::tables;
 use super::header::{Comments, Header};
 use super::layout::Layout;
 use super::table::Table;
-use super::{compressed, moving, rotated, spacetime, splats};
+use super::{axes, compressed, deltas, moving, origin, rotated, spacetime, splats, unread};
 use crate::codec::import::columns::{Columns, Played};
 use crate::codec::import::cubic;
 use crate::codec::import::drawable::keep_drawable;
@@ -28,10 +28,11 @@ pub(crate) fn read(source: &Source<'_>, options: &ReadOptions) -> Result<Importe
     let layout = Layout::of(&tables)?;
     let vertex = vertex(&tables)?;
     if layout == Layout::Rotated {
-        return native(vertex, options);
+        return native(vertex, &header, options);
     }
     let (comments, mut lost) = (&header.comments, Vec::new());
-    let mut columns = at_rest(layout, &tables, comments, &mut lost)?;
+    let mut columns = at_rest(layout, &tables, comments, origin::of_comments(comments)?, &mut lost)?;
+    lost.extend(unread::sentences(layout, &header.elements));
     let (motion, played) = match layout {
         Layout::FreeTime => moving::free_time(vertex, comments, options, &mut lost)?,
         Layout::Sogst => moving::sogst(vertex, comments, options, &mut lost)?,
@@ -40,9 +41,14 @@ pub(crate) fn read(source: &Source<'_>, options: &ReadOptions) -> Result<Importe
         Layout::SogstCurved => moving::sogst(vertex, comments, options, &mut lost)?,
         Layout::Spacetime => spacetime::lifespans(vertex, options, &mut lost)?,
     };
+    let played = Played { up: axes::up(comments).unwrap_or(played.up), ..played };
+    let frames = if layout == Layout::Splats { deltas::frames(&tables, vertex.len())? } else { Vec::new() };
+    if !frames.is_empty() {
+        return deltas::imported(columns, &frames, played.up, options, lost);
+    }
     columns.motion = motion;
     if let Some(bends) = spacetime::bends(layout, vertex)? {
-        if layout == Layout::Spacetime {
+        if layout == Layout::Spacetime && !splats::has_plain_colors(vertex) {
             spacetime::decode_colors(&mut columns);
         }
         return cubic::imported(columns, bends, played, options, lost);
@@ -51,29 +57,35 @@ pub(crate) fn read(source: &Source<'_>, options: &ReadOptions) -> Result<Importe
     Ok(Imported { scene: columns.into_scene(played, options)?, lost })
 }
 
-/// Reads the Gaussians of a file that are all at rest.
+/// Reads the Gaussians of a file that are all at rest, relative to the origin that is given. Returns the axis that points up, too, if the file says it.
 ///
 /// # Errors
 /// As [`read`]; a file of moving Gaussians.
-pub(crate) fn still(bytes: &[u8], lost: &mut Vec<String>) -> Result<Columns, ImportError> {
+pub(crate) fn still(
+    bytes: &[u8],
+    origin: Option<[f64; 3]>,
+    lost: &mut Vec<String>,
+) -> Result<(Columns, Option<UpAxis>), ImportError> {
     let header = Header::read(bytes)?;
     let tables = tables(&header, bytes)?;
     let layout = Layout::of(&tables)?;
-    if !matches!(layout, Layout::Splats | Layout::Compressed) {
+    let is_at_rest = matches!(layout, Layout::Splats | Layout::Compressed);
+    if !is_at_rest || !deltas::frames(&tables, vertex(&tables)?.len())?.is_empty() {
         return Err(ImportError::unsupported(
             "holds moving Gaussians, which cannot be a frame of a sequence: open it by itself",
         ));
     }
-    let mut columns = at_rest(layout, &tables, &header.comments, lost)?;
+    let origin = origin.map_or_else(|| origin::of_comments(&header.comments), |origin| Ok(Some(origin)))?;
+    let mut columns = at_rest(layout, &tables, &header.comments, origin, lost)?;
+    lost.extend(unread::sentences(layout, &header.elements));
     lost.extend(keep_drawable(&mut columns));
-    Ok(columns)
+    Ok((columns, axes::up(&header.comments)))
 }
 
 /// Reads the table of the vertices of a file, of any layout.
 ///
 /// # Errors
 /// A file that is damaged, or has no vertices.
-#[cfg(feature = "offline")]
 pub(crate) fn vertices(bytes: &[u8]) -> Result<Table<'_>, ImportError> {
     let tables = tables(&Header::read(bytes)?, bytes)?;
     vertex(&tables).cloned()
@@ -88,24 +100,28 @@ fn at_rest(
     layout: Layout,
     tables: &[Table<'_>],
     comments: &Comments,
+    origin: Option<[f64; 3]>,
     lost: &mut Vec<String>,
 ) -> Result<Columns, ImportError> {
     let vertex = vertex(tables)?;
     match layout {
-        Layout::Compressed => compressed::columns(tables, vertex),
-        _ => splats::columns(vertex, comments, lost),
+        Layout::Compressed => compressed::columns(tables, vertex, origin, lost),
+        _ => splats::columns(vertex, comments, origin, lost),
     }
 }
 
 /// Reads native 4D Gaussians into the trained form.
-fn native(vertex: &Table<'_>, options: &ReadOptions) -> Result<Imported, ImportError> {
-    let mut trained = rotated::trained(vertex)?;
+fn native(vertex: &Table<'_>, header: &Header, options: &ReadOptions) -> Result<Imported, ImportError> {
+    let mut lost = unread::sentences(Layout::Rotated, &header.elements);
+    let (mut trained, origin) = rotated::trained(vertex, origin::of_comments(&header.comments)?, &mut lost)?;
     let convention = options.rotation_convention.unwrap_or_default();
     if convention == RotationConvention::Unflipped {
         trained.parameters.flip_rotations();
     }
-    let played = Played { duration_seconds: 1.0, marginal_cutoff: MARGINAL_CUTOFF, ..Played::still(UpAxis::PosZ) };
+    let up = axes::up(&header.comments).unwrap_or(UpAxis::PosZ);
+    let played = Played { duration_seconds: 1.0, marginal_cutoff: MARGINAL_CUTOFF, ..Played::still(up) };
     let mut scene = played.scene(SceneForm::Trained(trained), None, options)?;
     scene.trained_with.rotation_convention = convention;
-    Ok(Imported { scene, lost: Vec::new() })
+    scene.trained_with.origin.place = origin;
+    Ok(Imported { scene, lost })
 }

@@ -2,8 +2,9 @@
 //!
 //! In: the table of a file. Out: [`Trained`] with the trainer's raw parameters.
 
+use super::origin::{Places, place};
 use super::splats::rows;
-use super::table::{Table, row};
+use super::table::{Column, Table, row};
 use crate::codec::import::columns::logit;
 use crate::codec::import::error::ImportError;
 use crate::gaussian::{Harmonics, Parameters};
@@ -13,11 +14,16 @@ use rayon::prelude::*;
 /// The smallest scale that has a logarithm here.
 const SMALLEST: f32 = 1e-12;
 
-/// Reads native 4D Gaussians.
+/// Reads native 4D Gaussians. Returns the origin of their means, too, which is given or follows from their places; sentences about it are added to
+/// `lost`.
 ///
 /// # Errors
 /// A property that is missing; coefficients of no known degree.
-pub(super) fn trained(table: &Table<'_>) -> Result<Trained, ImportError> {
+pub(super) fn trained(
+    table: &Table<'_>,
+    origin: Option<[f64; 3]>,
+    lost: &mut Vec<String>,
+) -> Result<(Trained, [f64; 3]), ImportError> {
     let (mean, [mean_t]) = (table.all(["x", "y", "z"])?, table.all(["t"])?);
     let (scale, [scale_t]) = (table.all(["sx", "sy", "sz"])?, table.all(["st"])?);
     // The property that is called x is the first component, w.
@@ -25,16 +31,20 @@ pub(super) fn trained(table: &Table<'_>) -> Result<Trained, ImportError> {
     let right = table.all(["rot_r_x", "rot_r_y", "rot_r_z", "rot_r_w"])?;
     let [opacity] = table.all(["opacity"])?;
     let log = |scale: f32| scale.max(SMALLEST).ln();
+    let log_scale = rows(table, |index| row(&scale, index).map(log));
+    let at = |index| place(&mean, index);
+    let places = Places { count: table.len(), is_double: mean.iter().all(Column::is_double), at: &at };
+    let origin = places.origin(&log_scale, origin, lost);
     let parameters = Parameters {
-        mean: rows(table, |index| row(&mean, index)),
+        mean: rows(table, |index| places.mean(index, origin)),
         mean_t: rows(table, |index| mean_t.f32(index)),
-        log_scale: rows(table, |index| row(&scale, index).map(log)),
+        log_scale,
         log_scale_t: rows(table, |index| log(scale_t.f32(index))),
         rotation_l: rows(table, |index| row(&left, index)),
         rotation_r: rows(table, |index| row(&right, index)),
         opacity_logit: rows(table, |index| logit(opacity.f32(index))),
     };
-    Ok(Trained { parameters, harmonics: harmonics(table)? })
+    Ok((Trained { parameters, harmonics: harmonics(table)? }, origin))
 }
 
 fn harmonics(table: &Table<'_>) -> Result<Harmonics, ImportError> {

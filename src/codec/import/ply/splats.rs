@@ -3,39 +3,46 @@
 //! In: a table with means, scales, rotations, opacities and colors by the names of the original trainer. Out: [`Columns`] of Gaussians at rest.
 
 use super::header::Comments;
+use super::origin::{Places, place};
 use super::table::{Column, Table, row};
-use crate::codec::import::columns::{Columns, logit};
+use crate::codec::import::columns::{Columns, coefficient, logit};
 use crate::codec::import::error::ImportError;
 use crate::gaussian::Harmonics;
 use rayon::prelude::*;
 
 /// Fewest rows that are worth a thread.
 const ROWS: usize = 4096;
+/// The properties of colors without coefficients.
+pub(super) const PLAIN: [&str; 3] = ["red", "green", "blue"];
 
-/// Reads Gaussians at rest; sentences about what is not read are added to `lost`.
+/// Reads Gaussians at rest, with the origin that is given or follows from their places; sentences about what is not read are added to `lost`.
 ///
 /// # Errors
 /// A property that is missing; coefficients of no known degree.
-pub(super) fn columns(table: &Table<'_>, comments: &Comments, lost: &mut Vec<String>) -> Result<Columns, ImportError> {
+pub(super) fn columns(
+    table: &Table<'_>,
+    comments: &Comments,
+    origin: Option<[f64; 3]>,
+    lost: &mut Vec<String>,
+) -> Result<Columns, ImportError> {
     let (mean, scale) = (table.all(["x", "y", "z"])?, table.numbered::<3>("scale")?);
     let (rotation, [opacity]) = (table.numbered::<4>("rot")?, table.all(["opacity"])?);
+    let log_scale = rows(table, |index| row(&scale, index));
+    let at = |index| place(&mean, index);
+    let places = Places { count: table.len(), is_double: mean.iter().all(Column::is_double), at: &at };
+    let origin = places.origin(&log_scale, origin, lost);
     let mut columns = Columns {
-        mean: rows(table, |index| row(&mean, index)),
-        log_scale: rows(table, |index| row(&scale, index)),
+        mean: rows(table, |index| places.mean(index, origin)),
+        log_scale,
         rotation: rows(table, |index| row(&rotation, index)),
         opacity_logit: rows(table, |index| opacity.f32(index)),
         harmonics: harmonics(table, lost)?,
+        origin,
+        mip_filter: is_antialiased(comments),
         ..Columns::default()
     };
     if let Some(filter) = table.column("filter_3D") {
         fuse(&mut columns, filter);
-    }
-    if is_antialiased(comments) {
-        lost.push(
-            "It was trained with an anti-aliasing filter (Mip-Splatting), which is not drawn: small Gaussians look larger, by up to \
-             a pixel."
-                .to_owned(),
-        );
     }
     Ok(columns)
 }
@@ -47,6 +54,9 @@ pub(super) fn rows<T: Send>(table: &Table<'_>, value: impl Fn(usize) -> T + Sync
 
 /// Reads the colors. Coefficients above degree 0 lie channel after channel in the file.
 fn harmonics(table: &Table<'_>, lost: &mut Vec<String>) -> Result<Harmonics, ImportError> {
+    if has_plain_colors(table) {
+        return plain_colors(table);
+    }
     let first = table.numbered::<3>("f_dc")?;
     let (stored, degree) = degree(table.counted("f_rest"))?;
     let coefficients = (degree as usize + 1).pow(2);
@@ -67,6 +77,18 @@ fn harmonics(table: &Table<'_>, lost: &mut Vec<String>) -> Result<Harmonics, Imp
         }
     });
     Ok(Harmonics { coefficients, degree, degree_t: 0, values })
+}
+
+/// Returns whether the colors are red, green and blue, as nerfstudio writes them on demand, in place of coefficients.
+pub(super) fn has_plain_colors(table: &Table<'_>) -> bool {
+    !table.has("f_dc_0") && PLAIN.iter().all(|name| table.has(name))
+}
+
+/// Reads colors from 0 to 1 or, in bytes, to 255 as coefficients of degree 0.
+fn plain_colors(table: &Table<'_>) -> Result<Harmonics, ImportError> {
+    let colors = table.all(PLAIN)?;
+    let rgb = rows(table, |index| colors.map(|column| coefficient(column.share(index))));
+    Ok(Harmonics { coefficients: 1, degree: 0, degree_t: 0, values: rgb.into_flattened() })
 }
 
 /// Returns the coefficients above degree 0 that a file with this number of `f_rest` properties has for each channel, and the degree that is read.
@@ -102,7 +124,7 @@ fn fuse(columns: &mut Columns, filter: Column<'_>) {
     });
 }
 
-/// Returns whether the header says that the Gaussians were trained anti-aliased; the last comment decides.
+/// Returns whether the header says that the Gaussians were trained with the screen-space filter of Mip-Splatting; the last comment decides.
 fn is_antialiased(comments: &Comments) -> bool {
     let says = |comment: &String| {
         let one = Comments(vec![comment.clone()]);

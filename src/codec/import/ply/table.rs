@@ -106,10 +106,29 @@ impl Column<'_> {
         }
     }
 
-    /// Returns the value of a row as a share: of 255 if it is a byte, else the value itself; 0 beyond the last.
-    #[cfg(feature = "offline")]
+    /// Returns the value of a row in double precision; 0 beyond the last.
+    #[inline]
+    pub(crate) fn f64(&self, row: usize) -> f64 {
+        self.scalar.value(self.bytes.get(row * self.stride..).unwrap_or(&[]), self.is_big)
+    }
+
+    /// Returns whether the values of the file are in double precision.
+    pub(super) fn is_double(&self) -> bool {
+        self.scalar == Scalar::F64
+    }
+
+    /// Returns the largest value that an integer of the file stands for; `None` if its values are not bytes or words of 16 bits.
+    pub(super) fn largest(&self) -> Option<f64> {
+        match self.scalar {
+            Scalar::U8 => Some(255.0),
+            Scalar::U16 => Some(65_535.0),
+            _ => None,
+        }
+    }
+
+    /// Returns the value of a row as a share: of 255 if it is a byte, of 65 535 if it has 16 bits, else the value itself; 0 beyond the last.
     pub(crate) fn share(&self, row: usize) -> f32 {
-        self.f32(row) / if self.scalar == Scalar::U8 { 255.0 } else { 1.0 }
+        self.f32(row) / self.largest().unwrap_or(1.0) as f32
     }
 
     /// Returns the value of a row as a word of 32 bits; 0 beyond the last, and for values that are no such integer.

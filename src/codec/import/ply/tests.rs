@@ -4,7 +4,7 @@ use super::fixture::{File, read_bytes, refusal};
 use crate::codec::import::Imported;
 use crate::codec::import::columns::{SH_C0, logit};
 use crate::codec::options::ReadOptions;
-use crate::gaussian::{Gaussian, Harmonics, Model, Parameters, SMALLEST_CUTOFF};
+use crate::gaussian::{Gaussian, Harmonics, Model, Parameters, SMALLEST_CUTOFF, SliceSettings};
 use crate::scene::{Form, RotationConvention, SceneForm, Trained, UpAxis};
 use glam::Vec3;
 
@@ -63,14 +63,14 @@ fn encodings_types_and_orders_give_the_same_scene() {
     assert_eq!(read(&file.doubles()), expected, "doubles");
     let lines = String::from_utf8(file.ascii()).expect("text").replace('\n', "\r\n");
     assert_eq!(read(lines.as_bytes()), expected, "lines that end as on Windows");
-    let mut shuffled = file.with("red", |row| row as f32);
+    let mut shuffled = file;
     shuffled.names.reverse();
     shuffled.rows.iter_mut().for_each(|row| row.reverse());
-    assert_eq!(read(&shuffled.little()), expected, "another order, with another property");
+    assert_eq!(read(&shuffled.little()), expected, "another order");
 }
 
 #[test]
-fn other_elements_are_skipped() {
+fn other_elements_are_skipped_and_named() {
     let file = File::splats(3, 0);
     let (expected, little, ascii) = (read(&file.little()), file.little(), file.ascii());
     let face = "element face 2\nproperty uchar kind\nproperty list uchar int vertex_indices\nelement vertex";
@@ -80,15 +80,87 @@ fn other_elements_are_skipped() {
         [header.as_bytes(), faces, &bytes[end..]].concat()
     };
     let faces = [&[9u8, 3][..], &[1u8; 12], &[9, 0]].concat();
+    let named = vec!["Elements of the file that are not read (1): face (2 rows).".to_owned()];
+    let expected = Imported { lost: named, ..expected };
     assert_eq!(read(&with(&little, &faces)), expected, "binary lists before the vertices");
     assert_eq!(read(&with(&ascii, b"9 3 0 1 2\n9 0\n")), expected, "lists of numbers before the vertices");
+}
+
+#[test]
+fn properties_that_are_not_read_are_named() {
+    let lost = |file: &File| read(&file.little()).lost;
+    let marked = File::splats(2, 0).with("label", |_| 1.0).with("red", |_| 0.5).with("rot_x", |_| 0.0);
+    let sentence = "Properties of its vertices that are not read (3): label, red, rot_x.";
+    assert_eq!(lost(&marked), [sentence], "beside those of 3DGS");
+    let many = (0..11).fold(File::splats(1, 0), |file, number| file.with(&format!("f_language_{number}"), |_| 0.0));
+    let lost_of_many = lost(&many);
+    assert!(lost_of_many[0].contains("(11): f_language_0, "), "they are counted: {lost_of_many:?}");
+    assert!(lost_of_many[0].ends_with("f_language_7 and 3 more."), "eight are named: {lost_of_many:?}");
+    let free_time = free_time();
+    assert_eq!(lost(&free_time), [""; 0], "properties of the layout are read");
+    let other = free_time.with("trbf_scale", |_| 0.0);
+    assert!(lost(&other)[0].ends_with("(1): trbf_scale."), "those of another layout are not: {:?}", lost(&other));
+    let hidden = File::splats(1, 0).with("a\u{1b}[2J", |_| 0.0);
+    assert!(lost(&hidden)[0].contains(r"a\u{1b}[2J"), "a name does not control the terminal: {:?}", lost(&hidden));
+}
+
+#[test]
+fn colors_without_coefficients_are_of_degree_0() {
+    let mut file = File::splats(2, 0);
+    for number in 0..3 {
+        let column = file.names.iter().position(|name| *name == format!("f_dc_{number}")).expect("a color");
+        file.names.remove(column);
+        for row in &mut file.rows {
+            row.remove(column);
+        }
+    }
+    assert!(refusal(&file.little()).contains("no property f_dc_0"), "no colors");
+    let file = ["red", "green", "blue"].iter().fold(file, |file, name| file.with(name, |row| 0.25 + 0.5 * row as f32));
+    let imported = read(&file.little());
+    assert_eq!(imported.lost, [""; 0], "nothing is lost");
+    let (_, harmonics) = trained(imported);
+    assert_eq!((harmonics.degree, harmonics.coefficients), (0, 1), "without view-dependent color");
+    assert_eq!(harmonics.of(1), [0.25 / SH_C0; 3], "shares of 1");
+    let bytes = String::from_utf8(file.ascii()).expect("text").replace("0.25 0.25 0.25 ", "0 128 255 ");
+    let bytes = bytes.replace("0.75 0.75 0.75 ", "255 0 51 ");
+    let bytes = ["red", "green", "blue"]
+        .iter()
+        .fold(bytes, |text, name| text.replace(&format!("property float {name}"), &format!("property uchar {name}")));
+    let (_, harmonics) = trained(read(bytes.as_bytes()));
+    let expected = [-0.5, 128.0 / 255.0 - 0.5, 0.5].map(|share| share / SH_C0);
+    assert_eq!(harmonics.of(0), expected, "shares of 255");
+}
+
+#[test]
+fn comments_say_which_axis_points_up() {
+    let up = |comments: &[&str]| {
+        let comments = comments.iter().map(|comment| (*comment).to_owned()).collect();
+        read(&File { comments, ..File::splats(1, 0) }.little()).scene.playback.up
+    };
+    for (comment, expected) in [
+        ("Vertical Axis: z", UpAxis::PosZ),
+        ("Vertical axis: y", UpAxis::NegY),
+        ("vertical axis: x", UpAxis::PosX),
+        ("Vertical axis: sideways", UpAxis::NegY),
+        ("gs4d.up +y", UpAxis::PosY),
+        ("gs4d.up -x", UpAxis::NegX),
+    ] {
+        assert_eq!(up(&[comment]), expected, "{comment}");
+    }
+    assert_eq!(up(&["gs4d.up -z", "Vertical Axis: z"]), UpAxis::NegZ, "the own comment has a sign");
+    let moving = free_time().comment("gs4d.up +z");
+    assert_eq!(read(&moving.little()).scene.playback.up, UpAxis::PosZ, "of moving Gaussians, too");
+    let options = ReadOptions { up: Some(UpAxis::NegX), ..ReadOptions::default() };
+    let found = read_bytes(&moving.little(), &options).expect("it can be read");
+    assert_eq!(found.scene.playback.up, UpAxis::NegX, "an option is stronger");
 }
 
 #[test]
 fn a_file_that_is_cut_anywhere_is_refused() {
     let moving = File::splats(2, 0).with("t_center", |_| 0.5).with("t_sigma", |_| 0.1).with("vx", |_| 1.0);
     let moving = moving.with("vy", |_| 0.0).with("vz", |_| 0.0).comment("sogst.time_min 0").comment("sogst.time_max 1");
-    for file in [File::splats(3, 9).little(), compressed(3), moving.little()] {
+    let frames = animated(&File::splats(2, 0), &["x", "y", "z"], &[([-1.0, 1.0], vec![vec![0, 1, 2]; 2])]);
+    for file in [File::splats(3, 9).little(), compressed(3), moving.little(), frames] {
         read(&file);
         for length in 0..file.len() {
             let message = refusal(&file[..length]);
@@ -155,7 +227,7 @@ fn the_filter_of_mip_splatting_is_fused() {
     let file =
         File::splats(4, 0).with("filter_3D", |_| 0.3).comment("SplatRenderMode: default").comment("antialiased 1");
     let imported = read(&file.little());
-    assert!(imported.lost[0].contains("anti-aliasing"), "the filter of pixels is lost: {:?}", imported.lost);
+    assert!(imported.scene.trained_with.mip_filter, "the filter of pixels is drawn");
     let (parameters, _) = trained(imported);
     for row in 0..4 {
         let scale = [0, 1, 2].map(|axis| file.value(&format!("scale_{axis}"), row).exp());
@@ -168,11 +240,13 @@ fn the_filter_of_mip_splatting_is_fused() {
         let found = 1.0 / (1.0 + (-parameters.opacity_logit[row]).exp());
         assert!((found - opacity * factor).abs() < 1e-5, "the opacity of {row} is {opacity} times {factor}");
     }
-    for (comments, is_lost) in
+    for (comments, is_filtered) in
         [(["antialiased 1", "SplatRenderMode: default"], false), (["x", "SplatRenderMode: mip"], true)]
     {
         let file = File { comments: comments.map(str::to_owned).into(), ..File::splats(1, 0) };
-        assert_eq!(read(&file.little()).lost.len(), usize::from(is_lost), "the last of {comments:?} decides");
+        let Imported { scene, lost } = read(&file.little());
+        assert_eq!(scene.trained_with.mip_filter, is_filtered, "the last of {comments:?} decides");
+        assert!(lost.is_empty(), "nothing is lost: {lost:?}");
     }
 }
 
@@ -368,4 +442,188 @@ fn an_acceleration_bends_the_paths_of_sogst() {
         let expected = mean + Vec3::new(d, -9.0 * d * d, 0.5 * d);
         assert!(at.distance(expected) < 0.25 * largest + 1e-3, "at {time}: {at} is {expected}");
     }
+}
+
+/// Returns a file with frames of motion: for each the range of its values, and their parts of 254, row by row.
+fn animated(file: &File, names: &[&str], frames: &[([f32; 2], Vec<Vec<u8>>)]) -> Vec<u8> {
+    let bytes = file.little();
+    let end = bytes.windows(11).position(|window| window == b"end_header\n").expect("a header");
+    let mut header = String::from_utf8(bytes[..end].to_owned()).expect("text");
+    let mut body = bytes[end + 11..].to_owned();
+    for (number, ([low, high], rows)) in frames.iter().enumerate() {
+        for (limit, value) in [("min", low), ("max", high)] {
+            header += &format!("element meta_delta_{limit}_{number:05} 1\n");
+            for name in names {
+                header += &format!("property float {name}\n");
+                body.extend(value.to_le_bytes());
+            }
+        }
+        header += &format!("element delta_vertex_{number:05} {}\n", rows.len());
+        names.iter().for_each(|name| header += &format!("property uchar {name}\n"));
+        body.extend(rows.iter().flatten());
+    }
+    [header.as_bytes(), &b"end_header\n"[..], &body[..]].concat()
+}
+
+#[test]
+fn frames_of_motion_play() {
+    let file = File::splats(2, 0).comment("Exported from Brush").comment("Vertical axis: y");
+    let still = vec![127, 127, 127];
+    let range = [-0.3, 0.3];
+    let frames = [
+        (range, vec![still.clone(), still.clone()]),
+        (range, vec![vec![254, 127, 0], still.clone()]),
+        (range, vec![still.clone(), still.clone()]),
+    ];
+    let bytes = animated(&file, &["x", "y", "z"], &frames);
+    let options = ReadOptions { fps: Some(10.0), tolerance: Some(1e-3), ..ReadOptions::default() };
+    let imported = read_bytes(&bytes, &options).expect("it can be read");
+    assert_eq!(imported.scene.playback.duration_seconds, 0.2, "two steps at ten frames a second");
+    assert_eq!(imported.scene.trained_with.time_interval, [0.0, 0.2], "in seconds");
+    assert_eq!(imported.lost.len(), 1, "all is read: {:?}", imported.lost);
+    assert!(imported.lost[0].contains("2 Gaussians are 3 straight pieces"), "paths in pieces: {:?}", imported.lost);
+    let filter = imported.scene.filter.clone().expect("pieces have a filter");
+    let (gaussians, _) = sliced(imported);
+    for (time, change) in [(0.0, 0.0), (0.05, 0.5), (0.099, 0.99), (0.15, 0.5), (0.2, 0.0)] {
+        let segment = filter.segment_of(time, [0.0, 0.2]);
+        let active = (0..gaussians.len()).filter(|&index| filter.is_active(segment, index));
+        let at: Vec<Vec3> = active.map(|index| gaussians[index].mean_at(time)).collect();
+        let rest = [0, 1].map(|row| Vec3::from(["x", "y", "z"].map(|name| file.value(name, row))));
+        let expected = [rest[0] + change * Vec3::new(0.3, 0.0, -0.3), rest[1]];
+        let is_near = at.len() == 2 && at.iter().zip(expected).all(|(at, expected)| at.distance(expected) < 1e-5);
+        assert!(is_near, "at {time}: {at:?}, not {expected:?}");
+    }
+    let assumed = read(&bytes);
+    assert_eq!(assumed.scene.playback.duration_seconds, 2.0 / 30.0, "30 frames a second");
+    assert!(assumed.lost[0].contains("3 frames are played at 30 a second"), "which is said: {:?}", assumed.lost);
+}
+
+#[test]
+fn frames_of_motion_change_rotations_and_scales() {
+    let file = File::splats(1, 0);
+    let names = ["scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"];
+    let last = [254, 127, 0, 127, 254, 0, 127];
+    let frames = [([-1.0, 1.0], vec![vec![127; 7]]), ([-1.0, 1.0], vec![last.to_vec()])];
+    let imported = read(&animated(&file, &names, &frames));
+    assert!(imported.lost.iter().any(|lost| lost.contains("rotation and the scales")), "said: {:?}", imported.lost);
+    let found = sliced(imported).0[0];
+    let mut middle = file;
+    for (name, part) in names.iter().zip(last) {
+        let column = middle.names.iter().position(|found| found == name).expect("it is there");
+        middle.rows[0][column] += 0.5 * (f32::from(part) / 127.0 - 1.0);
+    }
+    let (parameters, _) = trained(read(&middle.little()));
+    let expected = parameters.slice(&SliceSettings::default()).expect("it can be drawn")[0];
+    for (found, expected) in found.covariance.iter().zip(expected.covariance) {
+        assert!((found - expected).abs() < 1e-4, "halfway between the frames: {found} is {expected}");
+    }
+}
+
+#[test]
+fn frames_of_a_mesh_are_refused() {
+    let bytes = animated(&File::splats(2, 0), &["x", "y", "z"], &[([0.0, 1.0], vec![vec![0, 0, 0]; 3])]);
+    let message = refusal(&bytes);
+    let is_clear =
+        ["delta_vertex_00000", "3 points", "2 Gaussians", "3DGS PLY"].iter().all(|part| message.contains(part));
+    assert!(is_clear, "the frame, both numbers and the way out: {message}");
+}
+
+/// Returns an ASCII file of small Gaussians of 3DGS at these places, which have the type `kind`.
+fn placed(kind: &str, places: &[[f64; 3]]) -> String {
+    let mut file = File::splats(places.len(), 0);
+    let scales: Vec<usize> = (0..file.names.len()).filter(|&column| file.names[column].starts_with("scale")).collect();
+    for row in &mut file.rows {
+        scales.iter().for_each(|&column| row[column] = -6.0);
+    }
+    let mut text = String::from_utf8(file.ascii()).expect("text");
+    for axis in ["x", "y", "z"] {
+        text = text.replace(&format!("property float {axis}\n"), &format!("property {kind} {axis}\n"));
+    }
+    let (header, body) = text.split_once("end_header\n").expect("a header");
+    let row = |(line, [x, y, z]): (&str, &[f64; 3])| {
+        let others: Vec<&str> = line.split(' ').skip(3).collect();
+        format!("{x} {y} {z} {}\n", others.join(" "))
+    };
+    let rows: String = body.lines().zip(places).map(row).collect();
+    format!("{header}end_header\n{rows}")
+}
+
+/// Places on a map, and their middle.
+const MAP: [[f64; 3]; 3] =
+    [[500_001.05, 5_400_000.5, 310.4], [499_999.25, 5_400_000.7, 309.4], [500_000.45, 5_400_001.1, 309.8]];
+const MIDDLE: [f64; 3] = [500_000.0, 5_400_001.0, 310.0];
+
+/// Reads a file, and returns the origin, the means, and what is said.
+fn origin(text: &str) -> ([f64; 3], Vec<[f32; 3]>, Vec<String>) {
+    let imported = read(text.as_bytes());
+    let (place, lost) = (imported.scene.trained_with.origin.place, imported.lost.clone());
+    (place, trained(imported).0.mean, lost)
+}
+
+#[test]
+fn places_on_a_map_are_relative_to_their_middle() {
+    let (place, means, lost) = origin(&placed("double", &MAP));
+    assert_eq!(place, MIDDLE, "the middle in whole units");
+    for (mean, place) in means.iter().zip(MAP) {
+        let expected: [f32; 3] = std::array::from_fn(|axis| (place[axis] - MIDDLE[axis]) as f32);
+        assert_eq!(*mean, expected, "no digit of {place:?} is lost");
+    }
+    assert_eq!(lost.len(), 1, "one sentence: {lost:?}");
+    let is_said = lost[0].contains("(500000, 5400001, 310)") && lost[0].contains("0.5 units");
+    assert!(is_said, "the origin, and the step of single precision: {lost:?}");
+
+    let (place, means, lost) = origin(&placed("float", &MAP));
+    assert_eq!(place, MIDDLE, "of single precision, too");
+    let expected: [f32; 3] = std::array::from_fn(|axis| (f64::from(MAP[2][axis] as f32) - MIDDLE[axis]) as f32);
+    assert_eq!(means[2], expected, "the digits that the file has");
+    assert!(lost[0].contains("Digits were lost") && lost[0].contains("0.5 units"), "which is said: {lost:?}");
+}
+
+#[test]
+fn places_near_zero_have_no_origin() {
+    let near = [[500.0, 0.25, 0.0], [501.0, 1.0, 0.5], [499.0, -1.0, 1.5]];
+    let (place, means, lost) = origin(&placed("double", &near));
+    assert_eq!((place, lost), ([0.0; 3], Vec::new()), "370 times as far as large");
+    assert_eq!(means, near.map(|place| place.map(|value| value as f32)), "the places as they are");
+    let farther = near.map(|[x, y, z]| [x + 1500.0, y, z]);
+    assert_eq!(origin(&placed("double", &farther)).0, [2000.0, 0.0, 1.0], "1500 times as far as large");
+    let around = |center: f64, other: f64| {
+        let mut places: Vec<[f64; 3]> = (0..30).map(|index| [center, f64::from(index) * 0.1, 0.0]).collect();
+        places.push([other, 0.0, 0.0]);
+        placed("double", &places)
+    };
+    assert_eq!(origin(&around(0.0, 1e7)).0, [0.0; 3], "a Gaussian far from the others does not count");
+    assert_eq!(origin(&around(1e7, 0.0)).0, [1e7, 1.0, 0.0], "nor one at 0");
+    let wide: Vec<[f64; 3]> = (0..30).map(|index| [1e7, f64::from(index) * 1e4, 0.0]).collect();
+    let (place, _, lost) = origin(&placed("double", &wide));
+    assert_eq!(place, [0.0; 3], "a scene of 290,000 units");
+    assert!(lost[0].contains("steps of 1 units at 10000000"), "digits that are rounded are said: {lost:?}");
+}
+
+#[test]
+fn a_comment_says_the_origin() {
+    let text = placed("double", &MAP).replace("element", "comment gs4d.origin 499999 5400000 0.5\nelement");
+    let (place, means, _) = origin(&text);
+    assert_eq!(place, [499_999.0, 5_400_000.0, 0.5], "the origin of the comment");
+    assert_eq!(
+        means[1],
+        [0.25, (5_400_000.7_f64 - 5_400_000.0) as f32, (309.4_f64 - 0.5) as f32],
+        "means relative to it"
+    );
+    for bad in ["gs4d.origin 1 2", "gs4d.origin 1 2 x", "gs4d.origin 1 2 inf"] {
+        let text = placed("double", &MAP).replace("element", &format!("comment {bad}\nelement"));
+        assert!(refusal(text.as_bytes()).contains("gs4d.origin"), "{bad}: no origin");
+    }
+}
+
+#[test]
+fn compressed_places_on_a_map_are_relative_to_their_middle() {
+    let mut bytes = compressed(2);
+    let start = bytes.windows(11).position(|window| window == b"end_header\n").expect("a header") + 11;
+    bytes[start..start + 4].copy_from_slice(&5e6_f32.to_le_bytes());
+    bytes[start + 24..start + 28].copy_from_slice(&(5e6_f32 + 2.0).to_le_bytes());
+    let imported = read(&bytes);
+    assert_eq!(imported.scene.trained_with.origin.place, [5e6, -2.0, -3.0], "the first of two is the middle");
+    assert!(imported.lost[0].contains("Digits were lost"), "boxes in single precision: {:?}", imported.lost);
+    assert_eq!(trained(imported).0.mean, [[0.0; 3], [2.0, 4.0, 6.0]], "the corners of the box");
 }

@@ -1,18 +1,14 @@
 //! The files of a capture of the SOG family.
 //!
-//! In: a zip archive in memory, or the files beside a file. Out: the bytes of a file by its name. The unpacked size of an entry is compared with
-//! the limit before it is read, so that a small archive cannot fill the memory.
+//! In: a zip archive in memory, or the files beside a file. Out: the bytes of a file by its name. What the entries of an archive unpack to is limited by
+//! its [`Budget`].
 
+use crate::codec::budget::Budget;
 use crate::codec::import::ImportError;
 use crate::codec::import::source::Beside;
 use crate::codec::text::printable;
-use std::io::{Cursor, Read};
+use std::io::Cursor;
 use zip::ZipArchive;
-
-/// Unpacked bytes for each byte of an archive. Textures are compressed already, and `meta.json` is a small part of an archive.
-const UNPACKED: u64 = 8;
-/// Unpacked bytes of an archive of any size.
-const ALWAYS: u64 = 1 << 20;
 
 /// Files by name.
 pub(super) struct Files<'a> {
@@ -22,8 +18,7 @@ pub(super) struct Files<'a> {
 enum Place<'a> {
     Archive {
         zip: ZipArchive<Cursor<&'a [u8]>>,
-        /// Bytes that may still be unpacked.
-        left: u64,
+        budget: Budget,
     },
     Beside {
         files: &'a dyn Beside,
@@ -41,8 +36,7 @@ impl<'a> Files<'a> {
         let zip = ZipArchive::new(Cursor::new(bytes)).map_err(|error| {
             ImportError::damaged(format!("its zip archive is damaged: {error}; copy the file again"))
         })?;
-        let left = (bytes.len() as u64).saturating_mul(UNPACKED).saturating_add(ALWAYS);
-        Ok(Self { place: Place::Archive { zip, left } })
+        Ok(Self { place: Place::Archive { zip, budget: Budget::of(bytes.len() as u64) } })
     }
 
     /// Returns the files of a folder, whose path is relative to that of `files`.
@@ -56,29 +50,16 @@ impl<'a> Files<'a> {
     /// # Errors
     /// A file that is not there or cannot be read; an entry that is damaged or unpacks to too many bytes.
     pub(super) fn read(&mut self, name: &str) -> Result<Vec<u8>, ImportError> {
-        let (zip, left) = match &mut self.place {
+        let (zip, budget) = match &mut self.place {
             Place::Beside { files, folder } => return Ok(files.read(&format!("{folder}{name}"))?),
-            Place::Archive { zip, left } => (zip, left),
+            Place::Archive { zip, budget } => (zip, budget),
         };
         let shown = printable(name);
         let damaged = |reason: String| ImportError::damaged(format!("its file {shown} {reason}"));
         let index = zip.index_for_name(name).ok_or_else(|| damaged("is missing; copy the file again".to_owned()))?;
         let entry = zip.by_index(index).map_err(|error| damaged(format!("cannot be unpacked: {error}")))?;
         let size = entry.size();
-        if size > *left {
-            return Err(damaged(format!("unpacks to {size} bytes, too many for an archive of this size")));
-        }
-        *left -= size;
-        let mut bytes = Vec::new();
-        // The checksum is compared at the end of the entry.
-        entry
-            .take(size + 1)
-            .read_to_end(&mut bytes)
-            .map_err(|error| damaged(format!("cannot be unpacked: {error}")))?;
-        if bytes.len() as u64 != size {
-            return Err(damaged("does not unpack to the size that the archive states".to_owned()));
-        }
-        Ok(bytes)
+        budget.unpack_stated(entry, size).map_err(|error| damaged(error.to_string()))
     }
 }
 
@@ -114,12 +95,18 @@ mod tests {
     #[test]
     fn an_archive_that_unpacks_to_many_times_its_size_is_refused() {
         let zeros = vec![0; 900_000];
-        let bytes = archive(&[("a", &zeros), ("b", &zeros)], CompressionMethod::Deflated);
-        assert!(bytes.len() < 10_000, "zeros are small");
+        let mut bytes = archive(&[("a", &zeros), ("b", &zeros[1..])], CompressionMethod::Deflated);
+        // The second entry states 805 MB.
+        let stated = 899_999_u32.to_le_bytes();
+        for at in 0..bytes.len() - stated.len() {
+            if bytes[at..].starts_with(&stated) {
+                bytes[at..at + stated.len()].copy_from_slice(&0x3000_0000_u32.to_le_bytes());
+            }
+        }
         let mut files = Files::of_archive(&bytes).expect("an archive");
         assert_eq!(files.read("a").map(|bytes| bytes.len()).ok(), Some(zeros.len()), "below the limit");
         let message = files.read("b").expect_err("above the limit").to_string();
-        assert!(message.contains("b unpacks to 900000 bytes"), "all entries together have one limit: {message}");
+        assert!(message.starts_with("its file b takes 805306368 bytes or more"), "file and claim: {message}");
     }
 
     #[test]

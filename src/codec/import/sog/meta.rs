@@ -3,6 +3,7 @@
 //! In: its bytes. Out: a JSON value, of which each format reads its own structures, and the structures that they share.
 
 use crate::codec::import::ImportError;
+use crate::codec::json;
 use crate::codec::text::printable;
 use serde::Deserialize;
 use serde_json::Value;
@@ -66,7 +67,7 @@ pub(super) struct Palette {
 /// # Errors
 /// Bytes that are not JSON.
 pub(super) fn parse(name: &str, bytes: &[u8]) -> Result<Value, ImportError> {
-    serde_json::from_slice(bytes).map_err(|error| unreadable(name, &error))
+    json::parse(bytes).map_err(|reason| unreadable(name, &reason))
 }
 
 /// Returns a structure of a parsed file.
@@ -74,11 +75,11 @@ pub(super) fn parse(name: &str, bytes: &[u8]) -> Result<Value, ImportError> {
 /// # Errors
 /// A field that is missing or has another type.
 pub(super) fn part<'v, T: Deserialize<'v>>(name: &str, value: &'v Value) -> Result<T, ImportError> {
-    T::deserialize(value).map_err(|error| unreadable(name, &error))
+    T::deserialize(value).map_err(|error| unreadable(name, &printable(&error.to_string())))
 }
 
-fn unreadable(name: &str, error: &serde_json::Error) -> ImportError {
-    ImportError::damaged(format!("its {name} cannot be read: {}", printable(&error.to_string())))
+fn unreadable(name: &str, reason: &str) -> ImportError {
+    ImportError::damaged(format!("its {name} cannot be read: {reason}"))
 }
 
 #[cfg(test)]
@@ -94,5 +95,7 @@ mod tests {
         let message = part::<Images>("meta.json", &value).expect_err("no textures").to_string();
         assert!(message.contains("means"), "{message}");
         assert!(parse("meta.json", b"{").is_err(), "cut JSON");
+        let message = parse("meta.json", b"{\"count\":\nNaN}").expect_err("no number").to_string();
+        assert!(message.starts_with("its meta.json cannot be read: line 2 has NaN"), "{message}");
     }
 }

@@ -17,4 +17,4 @@ mod streamed;
 mod textures;
 mod tsog;
 
-pub(crate) use reader::{EXTENSIONS, is_of, read};
+pub(crate) use reader::{EXTENSIONS, is_of, main_file, read};

@@ -13,14 +13,24 @@ use crate::codec::start::{Start, ZIP};
 /// Extensions of its archives, without the dot.
 pub(crate) const EXTENSIONS: &[&str] = &["sog", "sogst", "sog4d", "tsog"];
 
-/// Returns whether a file is of the family: an archive with a `meta.json`, or such a file alone.
+/// Names of the file of a folder that says how to read the others.
+const MAIN: [&str; 2] = ["lod-meta.json", META];
+/// Its name in an archive.
+const META: &str = "meta.json";
+
+/// Returns whether a file is of the family: an archive with a `meta.json`, or such a file alone, whatever its name.
 pub(crate) fn is_of(start: &Start) -> bool {
     if start.bytes.starts_with(ZIP) {
-        return start.has_entry("meta.json");
+        return start.has_entry(META);
     }
-    let names = |name: &str| start.bytes.windows(name.len()).any(|window| window == name.as_bytes());
-    let is_object = start.bytes.trim_ascii_start().starts_with(b"{");
-    start.extension == "json" && is_object && ["\"lodLevels\"", "\"means\"", "\"codebook\""].into_iter().any(names)
+    let is_named = start.extension == "json" && ["\"means\"", "\"codebook\""].iter().any(|key| start.mentions(key));
+    let has_means = start.mentions("\"means\"") && start.mentions("\"mins\"");
+    start.is_object() && (is_named || has_means || start.mentions("\"lodLevels\""))
+}
+
+/// Returns the name of the file that says how to read the others of a folder; `None` if the folder has no such file.
+pub(crate) fn main_file(folder: &Start) -> Option<&'static str> {
+    MAIN.into_iter().find(|name| folder.has_entry(name))
 }
 
 /// Reads a scene.
@@ -30,12 +40,8 @@ pub(crate) fn is_of(start: &Start) -> bool {
 pub(crate) fn read(source: &Source<'_>, options: &ReadOptions) -> Result<Imported, ImportError> {
     let is_archive = source.bytes.starts_with(ZIP);
     let mut files = if is_archive { Files::of_archive(source.bytes)? } else { Files::beside(source.beside, "") };
-    let value = if is_archive {
-        meta::parse("meta.json", &files.read("meta.json")?)?
-    } else {
-        meta::parse("meta.json", source.bytes)?
-    };
-    let kind: Kind = meta::part("meta.json", &value)?;
+    let value = if is_archive { meta::parse(META, &files.read(META)?)? } else { meta::parse(META, source.bytes)? };
+    let kind: Kind = meta::part(META, &value)?;
     match (kind.format.as_deref(), kind.name.as_deref(), kind.version) {
         _ if kind.levels.is_some() => streamed::read(source.beside, &value, options),
         (Some("sogst"), ..) => sogst::read(&mut files, &value, options),

@@ -88,23 +88,21 @@ pub(super) fn columns(files: &mut Files, meta: &Value, ranges: Option<&[Range<us
         }
         Some(version) => {
             return Err(ImportError::unsupported(format!(
-                "a SOG of version {version}, and only versions 1 and 2 are known; export it with splat-transform as PLY"
+                "a SOG of version {version}, and only versions 1 and 2 are known; convert it to PLY with the current splat-transform"
             )));
         }
     };
-    let mut lost = Vec::new();
     let Drawn { model } = meta::part("meta.json", meta)?;
-    match model.as_deref() {
-        None => {}
-        Some("antialiased") => lost.push(
-            "Its Gaussians were trained with anti-aliased splats, and are drawn with the dilation of the original code: edges are softer."
-                .to_owned(),
-        ),
+    let mip_filter = match model.as_deref() {
+        None => false,
+        Some("antialiased") => true,
         Some(model) => {
             let model = printable(model);
-            return Err(ImportError::unsupported(format!("a SOG of the model \"{model}\", whose splats are not 3D Gaussians")));
+            return Err(ImportError::unsupported(format!(
+                "a SOG of the model \"{model}\", whose splats are not 3D Gaussians"
+            )));
         }
-    }
+    };
     let centroids = layout.centroids(files)?;
     let encoded = textures::read(files, layout.names())?;
     let count = textures::check_count(count, &encoded)?;
@@ -116,8 +114,8 @@ pub(super) fn columns(files: &mut Files, meta: &Value, ranges: Option<&[Range<us
         return Err(ImportError::damaged(format!("it has {count} Gaussians, fewer than lod-meta.json states")));
     }
     let kept: Vec<u32> = ranges.iter().flat_map(|range| splats::visible(&textures, range.clone())).collect();
-    lost.extend(invisible(wanted - kept.len(), wanted));
-    Ok(Still { columns: layout.columns(&textures, &centroids, &kept)?, lost })
+    let lost = invisible(wanted - kept.len(), wanted).into_iter().collect();
+    Ok(Still { columns: Columns { mip_filter, ..layout.columns(&textures, &centroids, &kept)? }, lost })
 }
 
 /// Returns the sentence about Gaussians of opacity 0, if there are any.

@@ -15,6 +15,7 @@ use crate::codec::options::ReadOptions;
 use crate::gaussian::{Harmonics, SMALLEST_CUTOFF};
 use crate::scene::pieces::{ALWAYS, Bends, Curve};
 use crate::scene::{MAX_SEGMENTS, TrainedCameras};
+use crate::view::RasterFov;
 use glam::DVec3;
 use rayon::prelude::*;
 use serde::Deserialize;
@@ -138,6 +139,7 @@ pub(super) fn read(files: &mut Files, meta: &Value, options: &ReadOptions) -> Re
     if let Some([x, y]) = cov2d_scale.filter(|&scale| scale != [1.0, 1.0]) {
         // The factors are those of the field-of-view sentinel for one camera.
         scene.trained_with.cameras = options.cameras.unwrap_or(TrainedCameras::Intrinsics);
+        scene.trained_with.raster_fov = options.raster_fov.unwrap_or(RasterFov::Reference);
         lost.push(format!(
             "Its footprints are {x} × {y} times as large as those of its Gaussians, as in training with intrinsics cameras; \
              they are drawn as for such cameras."
@@ -251,7 +253,7 @@ impl Reading {
 
 impl Group {
     fn append(&mut self, other: Self) {
-        let Columns { mean, log_scale, rotation, opacity_logit, harmonics, motion, filter: _ } = other.columns;
+        let Columns { mean, log_scale, rotation, opacity_logit, harmonics, motion, .. } = other.columns;
         let own = &mut self.columns;
         own.mean.extend(mean);
         own.log_scale.extend(log_scale);

@@ -1,9 +1,10 @@
 //! Textures: lossless WebP pictures whose texels are numbers.
 //!
 //! In: the bytes of WebP files. Out: their texels, red, green, blue and alpha, row by row, with the bytes as stored. The size of a texture is
-//! compared with the number of Gaussians before it is decoded.
+//! compared with the number of Gaussians before it is decoded, and the number of Gaussians with the [`Budget`] of all textures.
 
 use super::files::Files;
+use crate::codec::budget::Budget;
 use crate::codec::import::ImportError;
 use crate::codec::text::printable;
 use image_webp::WebPDecoder;
@@ -13,9 +14,9 @@ use std::io::Cursor;
 /// Texels of a texture for each Gaussian, and of every texture: more than any writer adds at the end of its rows.
 const TEXELS: usize = 4;
 const ALWAYS: usize = 1024;
-/// Gaussians for each byte of their textures, and of every capture. Real captures have one Gaussian in about ten bytes.
-const GAUSSIANS: usize = 4;
-const FEW: usize = 1 << 16;
+/// Bytes of a Gaussian that is made of textures: a texel of each of about ten, its numbers with color of degree 3, and the Gaussian as it is drawn. Its
+/// textures have about ten bytes.
+const GAUSSIAN: u64 = 440;
 
 /// The texels of a texture.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -117,13 +118,15 @@ pub(super) fn check_count<'e>(
     count: u64,
     encoded: impl IntoIterator<Item = &'e Encoded>,
 ) -> Result<usize, ImportError> {
-    let bytes = encoded.into_iter().map(|encoded| encoded.bytes.len()).sum::<usize>();
-    let most = bytes.saturating_mul(GAUSSIANS).saturating_add(FEW);
-    usize::try_from(count).ok().filter(|&count| count <= most && u32::try_from(count).is_ok()).ok_or_else(|| {
+    let bytes: u64 = encoded.into_iter().map(|encoded| encoded.bytes.len() as u64).sum();
+    let damaged = |reason: &str| {
         ImportError::damaged(format!(
-            "meta.json states {count} Gaussians, but the textures have only {bytes} bytes; copy the file again"
+            "meta.json states {count} Gaussians, but the textures have only {bytes} bytes; copy the file again{reason}"
         ))
-    })
+    };
+    let taken = Budget::of(bytes).take(count.saturating_mul(GAUSSIAN));
+    taken.map_err(|over| damaged(&format!(" (the set of Gaussians {over})")))?;
+    usize::try_from(count).ok().filter(|&count| u32::try_from(count).is_ok()).ok_or_else(|| damaged(""))
 }
 
 #[cfg(test)]
@@ -171,7 +174,10 @@ mod tests {
     fn more_gaussians_than_the_bytes_of_textures_can_have_are_refused() {
         let texture = encoded(&[7; 64 * 64 * 3], 64, 64, ColorType::Rgb8);
         assert_eq!(check_count(4096, [&texture]).ok(), Some(4096), "a plausible count");
-        let message = check_count(1 << 40, [&texture]).expect_err("too many").to_string();
-        assert!(message.contains("1099511627776 Gaussians"), "the message has the count: {message}");
+        for count in [1 << 40, 1 << 20] {
+            let message = check_count(count, [&texture]).expect_err("too many").to_string();
+            let is_complete = message.contains(&format!("{count} Gaussians")) && message.contains("may take");
+            assert!(is_complete, "the message has the count and the limit: {message}");
+        }
     }
 }

@@ -229,11 +229,14 @@ fn windows(frames: u32, codes: u32, low: &Texture, high: &Texture, kept: &[u32])
     }
 }
 
-/// Returns the seconds of the clip.
+/// Returns the seconds of the clip: those of the options, else those that the file states or that follow from its frames.
 ///
 /// # Errors
 /// A duration or frames a second that are not positive.
 fn duration(fields: &Fields, moving: &Moving, options: &ReadOptions) -> Result<f32, ImportError> {
+    if let Some(seconds) = options.duration_seconds {
+        return Ok(seconds);
+    }
     let fps = options.fps.map(f64::from).or(fields.playback.fps).or(fields.fps).unwrap_or(FPS);
     let seconds = match (moving, fields.playback.duration) {
         (Moving::Still, _) => return Ok(0.0),
@@ -246,6 +249,8 @@ fn duration(fields: &Fields, moving: &Moving, options: &ReadOptions) -> Result<f
     if seconds.is_finite() && seconds > 0.0 {
         Ok(seconds)
     } else {
-        Err(ImportError::damaged(format!("its meta.json has a duration of {seconds} seconds; give another duration")))
+        Err(ImportError::damaged(format!(
+            "its meta.json has a duration of {seconds} seconds; --duration sets another one"
+        )))
     }
 }

@@ -3,6 +3,7 @@
 //! In: the bytes of a file. Out: [`Payload`]: what the header says, and the six columns, decompressed. Versions 2 and 3 are one stream of gzip, version 4
 //! is a header and one zstd frame for each column. A header may promise only as much as its file can hold.
 
+use crate::codec::budget::Budget;
 use crate::codec::import::error::ImportError;
 use crate::codec::start::Start;
 use crate::codec::zstd_frames;
@@ -18,13 +19,13 @@ const GZIP: &[u8] = &[0x1f, 0x8b];
 const HEADER: usize = 16;
 /// Bytes of the header of version 4.
 const HEADER_4: usize = 32;
-/// Most bytes that one byte of a file holds: the limit of DEFLATE, which files of version 4 do not approach either.
-const RATIO: u64 = 1032;
-/// Bytes that a file of any length may hold.
-const SMALL: u64 = 64 << 10;
+/// Bytes of a Gaussian that is made of the columns, as it is read and as it is drawn, without its coefficients.
+const GAUSSIAN: u64 = 160;
+/// Bytes of its coefficients of one degree and order.
+const COEFFICIENT: u64 = 12;
 /// Most bytes of extension records behind the columns.
 const EXTENSIONS: u64 = 64 << 10;
-/// The flag of files trained with anti-aliasing.
+/// The flag of files trained with anti-aliasing, the screen-space filter of Mip-Splatting.
 const ANTIALIASED: u8 = 1;
 /// The flag of files with extension records.
 const EXTENDED: u8 = 2;
@@ -175,12 +176,13 @@ impl Header {
     fn checked_size(&self, length: usize) -> Result<u64, ImportError> {
         let gaussian: usize = Column::ALL.iter().map(|&column| width(column, (self.version, self.degree))).sum();
         let size = self.count as u64 * gaussian as u64;
-        if size > (length as u64).saturating_mul(RATIO).saturating_add(SMALL) || usize::try_from(size).is_err() {
-            return Err(ImportError::damaged(format!(
-                "its header promises {} Gaussians, more than its {length} bytes can hold",
+        let made = self.count as u64 * (GAUSSIAN + COEFFICIENT * COEFFICIENTS[self.degree] as u64);
+        Budget::of(length as u64).take(size + made).map_err(|over| {
+            ImportError::damaged(format!(
+                "its header promises {} Gaussians, more than its {length} bytes can hold: the set of them {over}",
                 self.count
-            )));
-        }
+            ))
+        })?;
         Ok(size)
     }
 

@@ -31,7 +31,7 @@ pub(crate) fn read(source: &Source<'_>, options: &ReadOptions) -> Result<Importe
 /// As [`read`].
 pub(crate) fn columns(file: &[u8]) -> Result<(Columns, Vec<String>), ImportError> {
     let payload = Payload::of(file)?;
-    let mut columns = decode(&payload);
+    let mut columns = Columns { mip_filter: payload.is_antialiased, ..decode(&payload) };
     let Some(axes) = to_right_up_back(payload.system) else {
         return Err(ImportError::damaged(format!("coordinate system {}, of which 16 exist", payload.system)));
     };
@@ -42,12 +42,6 @@ pub(crate) fn columns(file: &[u8]) -> Result<(Columns, Vec<String>), ImportError
             "The colors of degree 4, 9 coefficients of each of {} Gaussians, are left out.",
             payload.count
         ));
-    }
-    if payload.is_antialiased {
-        lost.push(
-            "It was trained with the filter of Mip-Splatting, which is not applied: fine detail is slightly thicker."
-                .to_owned(),
-        );
     }
     Ok((columns, lost))
 }
@@ -208,7 +202,8 @@ mod tests {
                 }
                 let [w, x, y, z] = columns.rotation[0];
                 assert!((w * w + x * x + y * y + z * z - 1.0).abs() < 0.01, "a rotation of length 1");
-                assert_eq!(lost.len(), 1, "anti-aliasing is stated: {lost:?}");
+                assert!(columns.mip_filter, "the file says that it was trained with the filter of Mip-Splatting");
+                assert!(lost.is_empty(), "nothing is lost: {lost:?}");
             }
         }
     }
@@ -320,6 +315,7 @@ mod tests {
         for (up, expected) in [(None, UpAxis::PosY), (Some(UpAxis::NegY), UpAxis::NegY)] {
             let scene = read(&source, &ReadOptions { up, ..ReadOptions::default() }).expect("a file").scene;
             assert_eq!(scene.playback.up, expected, "the axis that points up");
+            assert!(scene.trained_with.mip_filter, "the filter of the file is drawn");
             assert!(matches!(scene.form, SceneForm::Trained(_)), "Gaussians at rest are in the trained form");
         }
     }
