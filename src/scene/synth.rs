@@ -6,6 +6,7 @@
 use super::random::Random;
 use super::{GaussianScene, PlaybackHints, SceneForm, Trained, TrainedWith};
 use crate::gaussian::{Harmonics, Parameters};
+use crate::view::RasterFov;
 use glam::{EulerRot, Quat, Vec3};
 use std::f32::consts::TAU;
 
@@ -69,7 +70,7 @@ pub fn synthesize(settings: &SynthSettings) -> GaussianScene {
         form: SceneForm::Trained(Trained { parameters, harmonics }),
         environment: None,
         filter: None,
-        trained_with: TrainedWith::default(),
+        trained_with: TrainedWith { raster_fov: RasterFov::Corrected, ..TrainedWith::default() },
         playback: PlaybackHints { duration_seconds: settings.duration_seconds, ..PlaybackHints::default() },
         levels: Vec::new(),
     }

@@ -1,23 +1,26 @@
 //! Compression: from a scene ready to draw to the packed form.
 //!
 //! In: a [`RuntimeScene`] and [`CompressSettings`] (or a [`Quality`] that selects them). Out: a scene in the packed
-//! form, its Gaussians in Morton order and without levels of detail, and a [`CompressReport`].
+//! form, its Gaussians in Morton order and without levels of detail, and a [`CompressReport`]. `promise` states what the
+//! quality promises and the result does not keep.
 //!
 //! 1. [`CompressSettings`] specify how much may be lost.
 //! 2. `codebook` trains the codebooks of color, if there are any.
 //! 3. `scene::packed` moves temporal means close to the time interval, sorts the Gaussians and encodes them as records.
 
 pub(crate) mod codebook;
+mod promise;
 pub(crate) mod roundings;
 mod settings;
 
+pub(crate) use promise::broken_promises;
 pub(crate) use roundings::roundings;
 pub use settings::{CompressSettings, Quality};
 
 use crate::gaussian::{Harmonics, InvalidGaussian};
 use crate::scene::packed::MAX_STAGES;
 use crate::scene::packed::anchor::move_near;
-use crate::scene::packed::order::morton_order;
+use crate::scene::packed::order::{is_filler, morton_order};
 use crate::scene::packed::pack::pack_ordered;
 use crate::scene::{
     Bits, CodedColors, Form, GaussianScene, PackError, PackedColors, Packing, RuntimeScene, SceneForm, TrainedWith,
@@ -31,6 +34,9 @@ use serde::Serialize;
 pub struct CompressReport {
     /// Number of Gaussians.
     pub gaussians: usize,
+    /// Number of invisible Gaussians that were added to fill blocks, so that Gaussians far from the others do not take the
+    /// digits of these.
+    pub fillers: usize,
     /// Bytes of Gaussians and colors in memory before compression.
     pub memory_before: usize,
     /// The same after compression, which is what the GPU holds.
@@ -193,18 +199,18 @@ fn compress_by(
     };
     if books.is_empty() {
         let packed = scene.pack(&Packing { bits: *bits, color_step: settings.color_step })?;
-        report.memory_after = packed.size();
+        (report.memory_after, report.fillers) = (packed.size(), packed.len() - report.gaussians);
         return Ok((packed.into(), report));
     }
     let order = morton_order(&sliced.gaussians);
-    let weights = match &settings.weights {
-        Some(weights) => order.iter().map(|&index| weights[index as usize]).collect(),
-        None => order.iter().map(|&index| sliced.gaussians[index as usize].opacity).collect::<Vec<_>>(),
-    };
+    let weight =
+        |index: usize| settings.weights.as_ref().map_or(sliced.gaussians[index].opacity, |weights| weights[index]);
+    let weight_at = |place: usize| if is_filler(&order, place) { 0.0 } else { weight(order[place] as usize) };
+    let weights: Vec<f32> = (0..order.len()).map(weight_at).collect();
     let (coded, base) = code(&sliced.harmonics, &order, bits, |rest| train(rest, &weights, books));
     report.codebooks.clone_from(&coded.entries);
     let packed = pack_ordered(scene, bits, &order, PackedColors::Coded(coded), base)?;
-    report.memory_after = packed.size();
+    (report.memory_after, report.fillers) = (packed.size(), packed.len() - report.gaussians);
     Ok((packed.into(), report))
 }
 

@@ -7,7 +7,7 @@ use crate::gaussian::{Gaussian, Harmonics};
 use crate::scene::Bits;
 use crate::scene::PackedColors;
 use crate::scene::packed::Rounding;
-use crate::scene::packed::order::morton_order;
+use crate::scene::packed::order::{is_filler, morton_order};
 use crate::scene::packed::pack::{check_each, encode_ordered};
 use rayon::prelude::*;
 
@@ -19,7 +19,8 @@ pub fn roundings(gaussians: &[Gaussian], bits: &Bits, reach: f32) -> Result<Vec<
     let order = morton_order(gaussians);
     let packed = encode_ordered(gaussians, &order, bits, PackedColors::Whole(Harmonics::default()), [0.0; 2], reach);
     check_each(&packed, &order)?;
-    let mut places = vec![0; order.len()];
-    order.iter().enumerate().for_each(|(place, &index)| places[index as usize] = place);
+    let mut places = vec![0; gaussians.len()];
+    let own = (0..order.len()).filter(|&place| !is_filler(&order, place));
+    own.for_each(|place| places[order[place] as usize] = place);
     Ok(places.par_iter().zip(gaussians).map(|(&place, gaussian)| packed.rounding(place, gaussian)).collect())
 }

@@ -14,13 +14,13 @@ use serde::{Deserialize, Serialize};
 const GAUSSIANS_OF_ENTRY: usize = 64;
 const STEP_OF_ENTRIES: usize = 64;
 
-/// How much may be lost. Default: [`Balanced`](Self::Balanced).
+/// How much may be lost; [`promise`](Self::promise) has it in dB. Default: [`Balanced`](Self::Balanced).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Quality {
     /// The smallest packages without obvious differences.
     Small,
-    /// At most 24 bytes per Gaussian and 1 MB of codebooks; 48 dB and more to the original's pictures.
+    /// At most 24 bytes per Gaussian and 1 MB of codebooks: about 50 dB to the original's pictures.
     #[default]
     Balanced,
     /// Color rounded but not coded, geometry with more bits: about 60 dB.

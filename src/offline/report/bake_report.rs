@@ -27,6 +27,8 @@ pub struct BakeReport {
     pub bytes: Change<u64>,
     /// The choices of the user and of the bake, as names and values.
     pub choices: Vec<(String, String)>,
+    /// What the quality promises and the package does not keep: one sentence each.
+    pub warnings: Vec<String>,
     /// Durations of the stages, in order; the stage that writes the report is not among them.
     pub stages: Vec<StageTime>,
     /// Bytes of the package by section.

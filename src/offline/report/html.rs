@@ -51,6 +51,7 @@ impl BakeReport {
 fn page(report: &BakeReport) -> String {
     let name = escape(&report.package);
     let cards: String = [
+        warnings(report),
         card("In short", "", &in_short(report)),
         card("Choices", "", &choices(report)),
         sections(report),
@@ -77,6 +78,12 @@ fn page(report: &BakeReport) -> String {
 fn card(title: &str, note: &str, body: &str) -> String {
     let note = if note.is_empty() { String::new() } else { format!("<p class=\"soft\">{}</p>", escape(note)) };
     format!("<section class=\"card\"><h2>{}</h2>{note}{body}</section>", escape(title))
+}
+
+/// Returns a card with the warnings; nothing if there are none.
+fn warnings(report: &BakeReport) -> String {
+    let paragraphs: String = report.warnings.iter().map(|warning| format!("<p>{}</p>", escape(warning))).collect();
+    if paragraphs.is_empty() { paragraphs } else { card("Warnings", "", &paragraphs) }
 }
 
 fn table(heads: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {

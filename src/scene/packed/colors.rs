@@ -4,12 +4,16 @@
 //! In: first coefficients, and codebooks with a code for every Gaussian. Out: [`CodedColors`], the words that the GPU
 //! reads; and the coefficients decoded from them. `offline::quantize::codebook` trains the codebooks.
 
+use super::additional_bits::additional_bits;
 use super::lanes::{self, BASE_MAX, COLOR_WORDS, MAX_ENTRIES, MAX_STAGES};
 use crate::gaussian::harmonics::BRIGHTEST;
 use crate::gaussian::{Harmonics, harmonics};
 use glam::Vec3;
 use half::f16;
 use rayon::prelude::*;
+
+/// Usual range of first coefficients. A larger range has more bits. Those of trained captures are 5 to 10.
+const BASES: f32 = 16.0;
 
 /// Colors coded by codebooks.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -47,13 +51,15 @@ impl CodedColors {
     }
 
     /// Creates colors of these degrees, without codebooks, from the first coefficient of each Gaussian, RGB, quantized
-    /// to `bits` bits for each channel, 1 to 10. Also returns the range (low, high) of the first coefficients.
+    /// to `bits` bits for each channel, 1 to 10; a large range has more, up to 10. Also returns the range (low, high) of
+    /// the first coefficients.
     pub fn of_base(degree: u32, degree_t: u32, base: &[[f32; 3]], bits: u32) -> (Self, [f32; 2]) {
         let values = base.as_flattened().iter();
         let (low, high) = values.fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
         let (low, size) = if low > high { (0.0, 0.0) } else { (low, high - low) };
         // With fewer bits, a subset of the 1024 values is used, with the first and the last value.
-        let levels = ((1u32 << bits.clamp(1, 10)) - 1) as f32;
+        let bits = bits.saturating_add(additional_bits(f64::from(size), f64::from(BASES))).clamp(1, 10);
+        let levels = ((1u32 << bits) - 1) as f32;
         let place = |value: f32| {
             let level = if size > 0.0 { ((value - low) / size * levels).round() } else { 0.0 };
             (level * (BASE_MAX / levels)).round() as u32

@@ -3,10 +3,14 @@
 //! In: Gaussians in the order in which they will be stored, the number of bits of each attribute, and colors that are
 //! packed already. Out: a [`PackedScene`]. An attribute of fewer than 16 bits leaves the low bits of its lanes zero,
 //! which costs nothing on disk; the largest splats keep all 16, since their errors are the most visible.
+//!
+//! A range that a few values stretch has more bits, so that these do not take the digits of the others.
 
+use super::additional_bits::additional_bits;
 use super::lanes::{self, ALWAYS, AT_REST, BLOCK, BlockRanges, FARTHEST, LANE_MAX, SharedRanges};
 use super::scene::{PackedColors, PackedScene};
 use super::shape::{Shape, smallest_three};
+use super::strays::{is_coarse, squared_size};
 use crate::gaussian::Gaussian;
 use crate::scene::Bounds;
 use rayon::prelude::*;
@@ -17,26 +21,36 @@ use std::f64::consts::FRAC_1_SQRT_2;
 /// Trained captures have scales a thousand times smaller, which are not visible and would waste half the range. This
 /// floor has no visible effect up to 100 dB.
 const FLATTEST: f32 = 1.0 / 16_384.0;
+/// In scenes of objects far apart that radius is large. If the smallest scale would be more than the first part of the usual size of a Gaussian, it is
+/// the second part of that size.
+const OF_USUAL: [f64; 2] = [1.0 / 16.0, 1.0 / 64.0];
+/// Usual ranges of the logarithms of scales and of σ_t. A larger range has more bits. Those of trained captures are 8 to 11.
+const LOG_SCALES: f64 = 14.0;
+const LOG_SIGMAS: f64 = 20.0;
+/// Largest displacement of a block, in displacements of which nine tenths of the moving Gaussians have less, from which the block has 16 bits. In
+/// blocks of trained captures it is at most 40.
+const FASTEST: f64 = 256.0;
 
 /// Number of bits of each attribute. Default: no visible difference.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Bits {
-    /// Mean, per axis, within the box of its block; 1 to 16.
+    /// Mean, per axis, within the box of its block; 1 to 16. A block whose steps would be large for its Gaussians has 16.
     pub mean: u32,
     /// Temporal mean, within two lengths of the time interval; 1 to 16. A larger range has more, up to 16.
     pub mean_t: u32,
-    /// Displacement within one σ_t or the time interval, whichever is shorter, per axis; 2 to 16.
+    /// Displacement within one σ_t or the time interval, whichever is shorter, per axis; 2 to 16. A block in which few are far
+    /// larger than the others has 16.
     pub velocity: u32,
-    /// Logarithm of σ_t; 1 to 15.
+    /// Logarithm of σ_t; 1 to 15. A range of more than a factor of 10⁸ has more, up to 15.
     pub sigma_t: u32,
-    /// Logarithm of the scale, per axis; 1 to 16.
+    /// Logarithm of the scale, per axis; 1 to 16. A range of more than a factor of 10⁶ has more, up to 16.
     pub scale: u32,
     /// Each of three components of the rotation; 1 to 16.
     pub rotation: u32,
     /// Opacity; 1 to 16.
     pub opacity: u32,
-    /// Base color, per channel, where colors are coded; 1 to 10.
+    /// Base color, per channel, where colors are coded; 1 to 10. A large range has more, up to 10.
     pub base: u32,
     /// Fraction of the Gaussians, those with the largest splats, that keep 16 bits for scale, rotation and mean; 0 to 1.
     pub escape: f32,
@@ -63,14 +77,18 @@ impl PackedScene {
     /// [`CodedColors::of_base`](super::CodedColors::of_base) returns it; `reach` is the longest time over which motion
     /// matters, the length of the time interval in timestamp units.
     pub fn encode(gaussians: &[Gaussian], bits: &Bits, colors: PackedColors, base: [f32; 2], reach: f32) -> Self {
-        let radius = Bounds::core(gaussians.iter().copied()).map_or(0.0, Bounds::radius);
-        let flattest = f64::from(radius * FLATTEST);
+        let flattest = flattest(gaussians);
         let shapes: Vec<Shape> = gaussians.par_iter().map(|gaussian| Shape::of(gaussian, flattest)).collect();
         let finite = |gaussian: &&Gaussian| gaussian.sigma_t.is_finite();
         let time = Span::of(gaussians.iter().map(|g| f64::from(g.mean_t)));
         let sigma = Span::of(gaussians.iter().filter(finite).map(|g| f64::from(g.sigma_t).ln()));
         let scale = Span::of(shapes.iter().flat_map(|shape| shape.log_scale.to_array()));
-        let quantizers = Quantizers::new(&Bits { mean_t: bits.mean_t + additional_bits(time, reach), ..*bits });
+        let quantizers = Quantizers::new(&Bits {
+            mean_t: bits.mean_t.saturating_add(additional_bits(time.size, 2.0 * f64::from(reach))),
+            sigma_t: bits.sigma_t.saturating_add(additional_bits(sigma.size, LOG_SIGMAS)),
+            scale: bits.scale.saturating_add(additional_bits(scale.size, LOG_SCALES)),
+            ..*bits
+        });
         let shared = SharedRanges {
             mean_t: time.range(quantizers.mean_t),
             log_sigma_t: sigma.range(quantizers.sigma_t),
@@ -91,12 +109,17 @@ impl PackedScene {
         };
         let encode_block = |(block, chunk): (usize, &[Gaussian])| {
             let mean = [0, 1, 2].map(|axis| Span::of(chunk.iter().map(|g| f64::from(g.mean[axis]))));
-            let most = chunk.iter().filter(finite).flat_map(displacement).fold(0.0f64, |most, d| most.max(d.abs()));
-            let ends = mean.map(|span| span.range(quantizers.mean));
+            let farthest =
+                |gaussian: &Gaussian| displacement(gaussian).into_iter().fold(0.0f64, |most, d| most.max(d.abs()));
+            let farthest: Vec<f64> = chunk.iter().filter(finite).map(farthest).collect();
+            let most = farthest.iter().copied().fold(0.0, f64::max);
+            let of_mean = if is_coarse(chunk) { Quantizer::new(16) } else { quantizers.mean };
+            let of_velocity = if is_stretched(farthest) { SignedQuantizer::new(16) } else { quantizers.velocity };
+            let ends = mean.map(|span| span.range(of_mean));
             let block_ranges = BlockRanges {
                 mean_low: ends.map(|[low, _]| low),
                 mean_size: ends.map(|[_, size]| size),
-                displacement: (most * (f64::from(FARTHEST) / quantizers.velocity_top()).powi(2)) as f32,
+                displacement: (most * (f64::from(FARTHEST) / of_velocity.top()).powi(2)) as f32,
                 rate: reach.max(f32::MIN_POSITIVE).recip(),
             };
             let encode = |(index, gaussian): (usize, &Gaussian)| {
@@ -104,7 +127,7 @@ impl PackedScene {
                 let mut record = [0; lanes::LANES];
                 for axis in 0..3 {
                     record[lanes::MEAN + axis] =
-                        quantizers.mean.encode(mean[axis].place(f64::from(gaussian.mean[axis])), fine[index]);
+                        of_mean.encode(mean[axis].place(f64::from(gaussian.mean[axis])), fine[index]);
                     record[lanes::SCALE + axis] =
                         quantizers.scale.encode(scale.place(shape.log_scale[axis]), fine[index]);
                 }
@@ -113,7 +136,7 @@ impl PackedScene {
                 if gaussian.sigma_t.is_finite() {
                     record[lanes::SIGMA_T] = deviation(gaussian);
                     for (lane, along) in record[lanes::DISPLACEMENT..].iter_mut().zip(displacement(gaussian)) {
-                        *lane = quantizers.encode_velocity(if most > 0.0 { along / most } else { 0.0 });
+                        *lane = of_velocity.encode(if most > 0.0 { along / most } else { 0.0 });
                     }
                 }
                 let (three, left_out) = smallest_three(shape.rotation);
@@ -190,18 +213,36 @@ impl Span {
     }
 }
 
-/// Returns the additional bits of temporal means in this range with which they are no coarser than over two lengths of the time
-/// interval.
-fn additional_bits(time: Span, reach: f32) -> u32 {
-    let times = time.size / (2.0 * f64::from(reach));
-    if times.is_finite() { times.log2().ceil().clamp(0.0, 16.0) as u32 } else { 0 }
+/// Quantizes fractions of the largest displacement, −1 to 1, by their signed square root, since most displacements are small.
+#[derive(Clone, Copy)]
+struct SignedQuantizer {
+    bits: u32,
+}
+
+impl SignedQuantizer {
+    fn new(bits: u32) -> Self {
+        Self { bits: bits.clamp(2, 16) }
+    }
+
+    /// Returns the largest difference from the middle of a lane.
+    fn top(self) -> f64 {
+        let levels = (1u32 << (self.bits - 1)) - 1;
+        f64::from(levels << (16 - self.bits))
+    }
+
+    /// Returns the lane value of a fraction.
+    fn encode(self, part: f64) -> u16 {
+        let step = f64::from(1u32 << (16 - self.bits));
+        let root = part.abs().sqrt().min(1.0).copysign(part);
+        (f64::from(AT_REST) + (root * self.top() / step).round() * step) as u16
+    }
 }
 
 /// Quantizers of all attributes.
 struct Quantizers {
     mean: Quantizer,
     mean_t: Quantizer,
-    velocity_bits: u32,
+    velocity: SignedQuantizer,
     sigma_t: Quantizer,
     scale: Quantizer,
     rotation: Quantizer,
@@ -213,7 +254,7 @@ impl Quantizers {
         Self {
             mean: Quantizer::new(bits.mean),
             mean_t: Quantizer::new(bits.mean_t),
-            velocity_bits: bits.velocity.clamp(2, 16),
+            velocity: SignedQuantizer::new(bits.velocity),
             // With 16 bits the largest value would be `ALWAYS`.
             sigma_t: Quantizer::new(bits.sigma_t.min(15)),
             scale: Quantizer::new(bits.scale),
@@ -221,20 +262,25 @@ impl Quantizers {
             opacity: Quantizer::new(bits.opacity),
         }
     }
+}
 
-    /// Returns the largest difference from the middle of a lane.
-    fn velocity_top(&self) -> f64 {
-        let levels = (1u32 << (self.velocity_bits - 1)) - 1;
-        f64::from(levels << (16 - self.velocity_bits))
-    }
+/// Returns the smallest scale that is stored, capture units.
+fn flattest(gaussians: &[Gaussian]) -> f64 {
+    let radius = Bounds::core(gaussians.iter().copied()).map_or(0.0, Bounds::radius);
+    let flattest = f64::from(radius * FLATTEST);
+    let mut sizes: Vec<f64> = gaussians.iter().map(|gaussian| squared_size(gaussian).sqrt()).collect();
+    let middle = sizes.len() / 2;
+    let usual = if sizes.is_empty() { 0.0 } else { *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 };
+    let [most, instead] = OF_USUAL.map(|part| part * usual);
+    if usual > 0.0 && flattest > most { instead } else { flattest }
+}
 
-    /// Returns the lane value of a fraction of the largest displacement, −1 to 1: its signed square root, since most
-    /// displacements are small.
-    fn encode_velocity(&self, part: f64) -> u16 {
-        let step = f64::from(1u32 << (16 - self.velocity_bits));
-        let root = part.abs().sqrt().min(1.0).copysign(part);
-        (f64::from(AT_REST) + (root * self.velocity_top() / step).round() * step) as u16
-    }
+/// Returns whether few of the displacements of a block are so much larger than the others that these would lose their digits.
+fn is_stretched(mut displacements: Vec<f64>) -> bool {
+    displacements.retain(|&displacement| displacement > 0.0);
+    let Some(last) = displacements.len().checked_sub(1) else { return false };
+    let most = displacements.iter().copied().fold(0.0, f64::max);
+    most > FASTEST * *displacements.select_nth_unstable_by(last * 9 / 10, f64::total_cmp).1
 }
 
 /// Returns for each Gaussian whether its splats are among the largest and most opaque.

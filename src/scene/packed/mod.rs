@@ -10,22 +10,28 @@
 //! | `pack.rs` | from a scene to its packed form |
 //! | `anchor.rs` | temporal means near the time interval |
 //! | `order.rs` | the order of the Gaussians: neighbors share a box |
+//! | `strays.rs` | Gaussians far from the others, which have blocks of their own |
 //! | `encode.rs` | from Gaussians to records and ranges |
 //! | `decode.rs` | from records and ranges to Gaussians and colors |
 //! | `rounding.rs` | the change of a Gaussian by packing |
+//! | `coarseness.rs` | whether Gaussians are stored with enough digits for their size |
 //! | `shape.rs` | a covariance as scales and a rotation, and back |
 //! | `colors.rs` | colors by codebook, and back |
 
+mod additional_bits;
 pub(crate) mod anchor;
+mod coarseness;
 mod colors;
 mod decode;
 pub(crate) mod encode;
 mod lanes;
+mod morton;
 pub(crate) mod order;
 pub(crate) mod pack;
 mod rounding;
 mod scene;
 mod shape;
+mod strays;
 
 pub use colors::CodedColors;
 pub use encode::Bits;

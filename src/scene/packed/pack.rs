@@ -1,11 +1,11 @@
 //! Packing: from a sliced scene to the packed form.
 //!
-//! In: a scene in the runtime form, and a [`Packing`]. Out: the same scene in the packed form, its Gaussians in Morton order; or why the packed
-//! form cannot hold it. Codebooks of color are trained elsewhere (feature `offline`), and packed by the same functions.
+//! In: a scene in the runtime form, and a [`Packing`]. Out: the same scene in the packed form, its Gaussians in Morton order, and invisible ones that
+//! fill blocks if some are far from the others; or why the packed form cannot hold it. Codebooks of color are trained elsewhere (feature `offline`), and packed by the same functions.
 
 use super::anchor::move_near;
 use super::encode::Bits;
-use super::order::morton_order;
+use super::order::{is_filler, morton_order};
 use super::scene::{PackedColors, PackedScene};
 use crate::gaussian::{Gaussian, Harmonics};
 use crate::scene::filter::{FilterKind, TemporalFilter};
@@ -68,7 +68,8 @@ impl Packing {
 }
 
 impl RuntimeScene {
-    /// Returns the scene in the packed form, with whole colors and without levels of detail. A support filter is computed again.
+    /// Returns the scene in the packed form, with whole colors and without levels of detail. A support filter is computed again. If some Gaussians are
+    /// so far from the others that these would lose digits, invisible Gaussians are added, which fill blocks.
     ///
     /// # Errors
     /// A scene that is packed already, a packing that is invalid, values that the packed form cannot hold.
@@ -110,7 +111,7 @@ pub(crate) fn pack_ordered(
     Ok(RuntimeScene { form: Form::Packed(packed), filter, levels: Vec::new(), ..scene })
 }
 
-/// Packs Gaussians in the given order.
+/// Packs Gaussians in the given order; fillers have opacity 0.
 pub(crate) fn encode_ordered(
     gaussians: &[Gaussian],
     order: &[u32],
@@ -119,7 +120,11 @@ pub(crate) fn encode_ordered(
     base: [f32; 2],
     reach: f32,
 ) -> PackedScene {
-    let ordered: Vec<Gaussian> = order.iter().map(|&index| gaussians[index as usize]).collect();
+    let at = |(place, &index): (usize, &u32)| {
+        let gaussian = gaussians[index as usize];
+        if is_filler(order, place) { Gaussian { opacity: 0.0, ..gaussian } } else { gaussian }
+    };
+    let ordered: Vec<Gaussian> = order.iter().enumerate().map(at).collect();
     PackedScene::encode(&ordered, bits, colors, base, reach)
 }
 
