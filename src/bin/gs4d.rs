@@ -3,6 +3,7 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
+    bevy_gs4d::renderer::silence_wayland();
     #[cfg(feature = "storage")]
     return bevy_gs4d::storage::run();
     #[cfg(not(feature = "storage"))]

@@ -3,7 +3,9 @@
 //! In: a checkpoint, its training views, validation views with images. Out: one row for the whole scene, one for each filter, one for
 //! each score at each ratio; nothing is trained.
 
-use super::args::{CheckpointArgs, EngineArgs, Given, ScoringArgs, SplitArgs, ValidationArgs, score_choice, values};
+use super::args::{
+    CheckpointArgs, EngineArgs, Given, Need, ScoringArgs, SplitArgs, ValidationArgs, score_choice, values,
+};
 use super::failure::Failure;
 use super::progress::Bars;
 use super::report::Report;
@@ -80,11 +82,10 @@ impl Ablate {
     /// A checkpoint or views that cannot be used, images that are missing or show something else, a table that cannot be written, a failure of the
     /// engine.
     pub(super) fn run(&self) -> Result<Report, Failure> {
-        self.engine.check(&self.given, &[])?;
+        self.engine.check(&self.given)?;
         self.scoring.check(&self.given, &self.variants)?;
-        if self.split != Measured::Validation {
-            self.given.none_of(&["--validation"], &format!("with --split {}", self.split.name()))?;
-        }
+        self.given.require(Need::DividedViews, self.split == Measured::Validation)?;
+        [Need::Playback, Need::UpAxis].into_iter().try_for_each(|need| self.given.require(need, false))?;
         if let Some(csv) = &self.csv {
             self.data.add_to(Files::default().reads_scene(&self.input)).writes(csv, "csv").check()?;
         }
@@ -99,7 +100,8 @@ impl Ablate {
                 let Splits { train, validation, .. } =
                     self.data.divide(self.validation, &scene.trained_with, progress)?;
                 if validation.is_empty() {
-                    return Err(OfflineError::NoValidation { what: "the table" }.into());
+                    let instead = "measure on the views of another --split";
+                    return Err(OfflineError::NoValidation { what: "the table", instead }.into());
                 }
                 (train, validation)
             }
@@ -111,7 +113,7 @@ impl Ablate {
         let measured = subset(measured, self.measured_views);
         require_images(&measured)?;
         let subject = Subject::new(&self.input, scene, self.checkpoint.background)?;
-        let mut engine = self.engine.open(&self.given, &[])?;
+        let mut engine = self.engine.open(&self.given)?;
         if !self.validation.trust_images {
             require_belonging(&mut engine, &subject.runtime, &measured, subject.background)?;
         }

@@ -4,13 +4,16 @@
 //! `NAME.report.html` beside it, a summary of the report; the capture trained from a dataset as `NAME.trained.gs4d`; or the stages as jobs for
 //! many machines, or one of these jobs.
 
-use super::args::{CheckpointArgs, EngineArgs, Given, PackageArgs, ScoringArgs, ValidationArgs, score_choice, values};
+use super::args::{
+    CheckpointArgs, EngineArgs, Given, Need, PackageArgs, ScoringArgs, ValidationArgs, score_choice, values,
+};
 use super::failure::Failure;
 use super::interrupt;
+use super::note::note;
 use super::progress::Bars;
 use super::report::Report;
 use super::table::{bytes, lines};
-use crate::offline::bake::{BakeSettings, Baked, bake, bake_job};
+use crate::offline::bake::{BakeSettings, Baked, bake, bake_job, check_pictures, obstacle_to_tuning};
 use crate::offline::engine::{Engine, EngineChoice};
 use crate::offline::evaluation::color_name;
 use crate::offline::files::Files;
@@ -69,6 +72,9 @@ pub(super) struct Bake {
     /// Divisor of the picture size (1, 2, 3, 4, 8), -1 (at most 1600 wide) or a target width, as in training.
     #[arg(long, help_heading = "Data", value_name = "N", allow_negative_numbers = true)]
     resolution: Option<i32>,
+    /// Read every view at time 0, as of a scene at rest; images in subfolders of a COLMAP dataset are then no frames of cameras.
+    #[arg(id = "static", long = "static", help_heading = "Data")]
+    is_static: bool,
     /// Number of Gaussians to train from pictures [default: 60000].
     #[arg(long, help_heading = "Training from pictures", value_name = "N", value_parser = values::count(100_000_000))]
     gaussians: Option<usize>,
@@ -168,14 +174,10 @@ impl JobArgs {
     /// Returns the job to run, if it is one, after checking that every option has an effect.
     fn job(&self, given: &Given, is_dataset: bool) -> Result<Option<Job>, Failure> {
         let Some(stage) = self.only else {
-            if self.plan.is_none() {
-                given.none_of(&["--shards"], "without --plan or --only score")?;
-            }
+            given.require(Need::Shards, self.plan.is_some())?;
             return Ok(None);
         };
-        if stage != "score" {
-            given.none_of(&["--shard", "--shards"], "on this stage: they are of --only score")?;
-        }
+        given.require(Need::ScoreStage, stage == "score")?;
         if stage == TRAIN && !is_dataset {
             return Err(Failure::new(
                 "a checkpoint is trained already: --only train needs the folder of a dataset as INPUT",
@@ -222,16 +224,13 @@ fn job_report(job: Job) -> Report {
     Report::new(json!({ "stage": job.stage, "shard": shard }), text)
 }
 
-/// The options of training, for which a GPU is needed.
-const OF_TRAINING: [&str; 5] = ["--steps", "--batch", "--rounds", "--sums", "--exposure"];
-
 impl Bake {
     /// Runs every stage whose result is not stored yet.
     ///
     /// # Errors
     /// A checkpoint or views that cannot be used, files that cannot be written, a failure of the engine.
     pub(super) fn run(&self) -> Result<Report, Failure> {
-        self.engine.check(&self.given, &OF_TRAINING)?;
+        self.engine.check(&self.given)?;
         self.scoring.check(&self.given, &[self.variant])?;
         let (settings, progress) = (self.settings(self.package.out()?)?, &mut Bars::default());
         settings.check_files()?;
@@ -240,10 +239,9 @@ impl Bake {
             return self.plan(path, &settings, progress);
         }
         let (scene, engine) = if self.is_dataset() {
-            let engine = self.engine.open(&self.given, &OF_TRAINING)?;
-            self.train(&settings, job, engine, progress)?
+            self.train(&settings, job, self.engine.open(&self.given)?, progress)?
         } else {
-            (self.checkpoint.load_to_change(&self.input)?, self.engine.open(&self.given, &OF_TRAINING)?)
+            (self.load(&settings, progress)?, self.engine.open(&self.given)?)
         };
         if let Some(job) = job {
             if job.stage != TRAIN {
@@ -252,6 +250,7 @@ impl Bake {
             return Ok(job_report(job));
         }
         let Baked { report, html, .. } = bake(scene, &settings, &mut { engine }, progress)?;
+        report.warnings.iter().for_each(|warning| note(&format!("warning: {warning}")));
         Ok(Report::new(report.json()?, in_short(&report, &html)))
     }
 
@@ -313,12 +312,11 @@ impl Bake {
     fn data(&self) -> Result<&Path, Failure> {
         match (&self.data, self.is_dataset()) {
             (Some(data), false) => {
-                let of_pictures = ["--gaussians", "--train-steps", "--environment"];
-                self.given.none_of(&of_pictures, "with a checkpoint: it is for training from pictures")?;
+                self.given.require(Need::Pictures, false)?;
                 Ok(data)
             }
             (None, true) => {
-                self.given.none_of(&CheckpointArgs::OF_CHECKPOINTS, "with a dataset: it is for checkpoints")?;
+                self.given.require(Need::Trained, false)?;
                 Ok(&self.input)
             }
             (Some(_), true) => Err(Failure::about(&self.input, "is the dataset: --data has no effect on it")),
@@ -329,7 +327,16 @@ impl Bake {
         }
     }
 
-    /// Trains the capture from the pictures of the dataset.
+    /// Reads the checkpoint, and checks that every option of training has an effect on it.
+    fn load(&self, settings: &BakeSettings, progress: &mut Bars) -> Result<GaussianScene, Failure> {
+        let scene = self.checkpoint.load_to_change(&self.input)?;
+        if self.given.depends_on(Need::Tuning) {
+            self.given.require(Need::Tuning, obstacle_to_tuning(&scene, settings, progress)?.is_none())?;
+        }
+        Ok(scene)
+    }
+
+    /// Trains the capture from the pictures of the dataset, after checking what the stages of the bake need.
     fn train(
         &self,
         settings: &BakeSettings,
@@ -337,9 +344,12 @@ impl Bake {
         mut engine: Engine,
         progress: &mut Bars,
     ) -> Result<(GaussianScene, Engine), Failure> {
+        let (training, only) = (self.training(settings), job.map(|job| job.stage));
+        if only.is_none_or(|stage| stage == TRAIN) {
+            check_pictures(settings, &training, &engine, progress)?;
+        }
         let deferred = interrupt::defer();
-        let only = job.map(|job| job.stage);
-        let scene = train_dataset(&self.training(settings), &settings.out, only, &mut engine, progress)?;
+        let scene = train_dataset(&training, &settings.out, only, &mut engine, progress)?;
         drop(deferred);
         Ok((scene, engine))
     }
@@ -350,7 +360,12 @@ impl Bake {
             checkpoint: if self.is_dataset() { trained_path(out) } else { self.input.clone() },
             data,
             out: out.to_owned(),
-            splits: SplitOptions { size: None, resolution: self.resolution, validation: self.validation.validation },
+            splits: SplitOptions {
+                size: None,
+                resolution: self.resolution,
+                validation: self.validation.validation,
+                is_static: self.is_static,
+            },
             // A capture of pictures is trained with the background, or has an environment map.
             background: if self.is_dataset() { None } else { self.checkpoint.background },
             goal: self.goal(),

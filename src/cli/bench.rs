@@ -3,7 +3,7 @@
 //! In: scenes, views of them, and the ways in which they are drawn. Out: medians of GPU milliseconds per pass and per frame, and of wall-clock
 //! time, with their spread over rounds.
 
-use super::args::{CheckpointArgs, RenderersArgs, ViewArgs, values};
+use super::args::{CheckpointArgs, Given, Need, RenderersArgs, ViewArgs, values};
 use super::failure::Failure;
 use super::note::note;
 use super::progress::Bars;
@@ -15,7 +15,7 @@ use crate::offline::orbit::{at_times, share};
 use crate::offline::proceed;
 use crate::reference::{Workload, workload};
 use crate::renderer::{ColorPrecision, Design, GpuCapture, Timings};
-use crate::scene::RuntimeScene;
+use crate::scene::{Form as DrawnForm, RuntimeScene, SceneForm};
 use crate::view::View;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -33,6 +33,8 @@ Examples:
   gs4d bench a.gs4d b.gs4d --renderer bins,sort --form stored,fp32 --filter on,off --rounds 3
   gs4d bench capture.gs4d --orbit 24 --size 1352x1014 --frames 1000 --json")]
 pub(super) struct Bench {
+    #[command(flatten)]
+    given: Given,
     /// The packages or checkpoints to draw.
     #[arg(value_name = "SCENE", required = true)]
     scenes: Vec<PathBuf>,
@@ -40,7 +42,7 @@ pub(super) struct Bench {
     #[arg(long, value_name = "N", default_value = "240", value_parser = values::count(1_000_000))]
     frames: usize,
     /// Views to take from a camera file, evenly; without one, views of an orbit.
-    #[arg(long = "views", value_name = "N", default_value = "12", conflicts_with = "orbit", value_parser = values::count(100_000))]
+    #[arg(id = "views", long = "views", value_name = "N", default_value = "12", conflicts_with = "orbit", value_parser = values::count(100_000))]
     count: usize,
     /// See every view at K times, evenly over the interval [default: each at its own time].
     #[arg(long, value_name = "K", conflicts_with = "time", value_parser = values::count(10_000))]
@@ -81,6 +83,16 @@ const SWITCH: [(&str, bool); 2] = [("on", true), ("off", false)];
 /// Views in which the splats of each pixel are counted, on the CPU.
 const COUNTED_VIEWS: usize = 3;
 
+/// A scene that has been read, with its views.
+struct Scene<'a> {
+    path: &'a Path,
+    form: Form,
+    /// Whether its file has packed Gaussians.
+    is_packed: bool,
+    scene: RuntimeScene,
+    views: Vec<View>,
+}
+
 /// A scene on the GPU, with its views.
 struct Subject<'a> {
     path: &'a Path,
@@ -106,20 +118,24 @@ impl Bench {
     /// # Errors
     /// A scene or views that cannot be used, no such adapter, a failure of the GPU.
     pub(super) fn run(&self) -> Result<Report, Failure> {
+        [Need::Background, Need::Playback].into_iter().try_for_each(|need| self.given.require(need, false))?;
+        self.given.require(Need::UpAxis, self.views.are_of_orbit())?;
         // A file that cannot be used is named where there is no adapter, too.
         let mut read = Vec::new();
         for path in &self.scenes {
             for &form in &self.form {
-                read.push((path, form, self.read(path, form)?));
+                read.push(self.read(path, form)?);
             }
         }
+        self.given.require(Need::Packed, read.iter().any(|scene| scene.is_packed))?;
+        self.given.require(Need::Filter, read.iter().any(|scene| scene.scene.filter.is_some()))?;
         let mut headless = self.renderer.open()?;
-        for (_, _, (_, views)) in &read {
+        for Scene { views, .. } in &read {
             // The targets of the frames in flight have about as many bytes as one read back and one that waits.
             Pictures::written(views.iter().map(|view| view.size), 1).require(Some(&headless), BY_SIZE)?;
         }
         let mut subjects = Vec::with_capacity(read.len());
-        for (path, form, (scene, views)) in read {
+        for Scene { path, form, scene, views, .. } in read {
             subjects.push(Subject { path, form, capture: headless.upload(&scene)?, scene, views });
         }
         let mut rows = Vec::new();
@@ -159,8 +175,9 @@ impl Bench {
     }
 
     /// Returns a scene in the form in which it is drawn, and its views.
-    fn read(&self, path: &Path, form: Form) -> Result<(RuntimeScene, Vec<View>), Failure> {
+    fn read<'a>(&self, path: &'a Path, form: Form) -> Result<Scene<'a>, Failure> {
         let scene = self.checkpoint.load(path)?;
+        let is_packed = matches!(scene.form, SceneForm::Ready(DrawnForm::Packed(_)));
         let scene = if form == Form::Unpacked { scene.unpacked() } else { scene };
         let scene = scene.into_runtime().map_err(|error| Failure::at(path, &error))?;
         let mut shots = share(self.views.shots(&scene, self.count)?, self.views.limit(self.count));
@@ -168,7 +185,7 @@ impl Bench {
             shots = at_times(shots, times, scene.trained_with.time_interval);
         }
         let views = shots.iter().map(|shot| shot.view(&scene)).collect();
-        Ok((scene, views))
+        Ok(Scene { path, form, is_packed, scene, views })
     }
 }
 

@@ -3,7 +3,7 @@
 //! In: two pictures, or two folders whose pictures are matched by file stem (8-bit, 16-bit or raw float32). Out: PSNR and SSIM of each pair,
 //! and their means.
 
-use super::args::{Given, values};
+use super::args::{Given, Need, values};
 use super::failure::Failure;
 use super::progress::Bars;
 use super::report::Report;
@@ -17,7 +17,7 @@ use std::path::PathBuf;
 
 /// Measure PSNR and SSIM of two pictures, or of the pictures of two folders.
 ///
-/// Pictures are .png, .jpg or .f32 (written by `render --raw`; needs --size). Alpha is ignored. Values of .f32 pictures are clamped to 0..1,
+/// Pictures are .png, .jpg or .f32 (written by `gs4d render --raw`; needs --size). Alpha is ignored. Values of .f32 pictures are clamped to 0..1,
 /// unless both pictures are .f32.
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -50,9 +50,7 @@ impl Compare {
     pub(super) fn run(&self) -> Result<Report, Failure> {
         let progress = &mut Bars::default();
         let pairs = Pairs::of(&self.a, &self.b, self.size)?;
-        if !pairs.has_raw() {
-            self.given.none_of(&["--size"], "without .f32 pictures")?;
-        }
+        self.given.require(Need::RawPictures, pairs.has_raw())?;
         let mut metrics = Vec::with_capacity(pairs.both.len());
         progress.begin("comparing", pairs.both.len());
         for pair in &pairs.both {

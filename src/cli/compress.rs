@@ -1,10 +1,11 @@
 //! `gs4d compress IN OUT`: quantizes geometry and codes colors by codebook.
 //!
-//! In: a scene, a quality or single options. Out: a package in the packed form, bytes by section, and PSNR of its
-//! pictures to those of the original scene.
+//! In: a scene, a quality or single options. Out: a package in the packed form, bytes by section, PSNR of its
+//! pictures to those of the original scene, and warnings if it does not keep what the quality promises.
 
-use super::args::{CheckpointArgs, EngineArgs, Given, PackageArgs, ViewArgs, file_size, values};
+use super::args::{CheckpointArgs, EngineArgs, Given, Need, PackageArgs, ViewArgs, file_size, values};
 use super::failure::Failure;
+use super::note::note;
 use super::progress::Bars;
 use super::report::Report;
 use super::table::{Table, bytes};
@@ -14,10 +15,9 @@ use crate::offline::convert::merge;
 use crate::offline::fidelity::Originals;
 use crate::offline::files::Files;
 use crate::offline::metrics::SquaredError;
-use crate::offline::quantize::{CompressSettings, Quality, compress_with, require_unpacked};
+use crate::offline::quantize::{CompressSettings, Quality, broken_promises, compress_with, require_unpacked};
 use crate::offline::score::read_weights;
-use crate::scene::Bits;
-use crate::scene::RuntimeScene;
+use crate::scene::{Bits, Form, RuntimeScene};
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -35,6 +35,7 @@ Examples:
   gs4d compress chkpnt30000.pth own.gs4d --codebooks 4096,4096 --scale-bits 10 --escape 0.05
 
 No choice is made on pictures, and no training views are needed: --cameras takes those of a dataset for the comparison with the original.
+A warning says if the package is farther from the original than its quality promises.
 gs4d bake and gs4d finetune --compress train codebooks on the training views, and lose less.")]
 pub(super) struct Compress {
     #[command(flatten)]
@@ -130,25 +131,6 @@ impl Knobs {
     }
 }
 
-/// The options of the views that are drawn, and of how.
-const OF_VERIFYING: [&str; 8] =
-    ["--cameras", "--orbit", "--time", "--size", "--resolution", "--engine", "--adapter", "--checks"];
-/// The options of geometry that is quantized.
-const OF_GEOMETRY: [&str; 8] = [
-    "--mean-bits",
-    "--mean-t-bits",
-    "--velocity-bits",
-    "--sigma-t-bits",
-    "--scale-bits",
-    "--rotation-bits",
-    "--opacity-bits",
-    "--escape",
-];
-/// The options of colors that are coded by codebooks.
-const OF_CODEBOOKS: [&str; 3] = ["--codebooks", "--base-bits", "--weights"];
-/// The option of colors that are not.
-const OF_WHOLE_COLORS: [&str; 1] = ["--color-step"];
-
 impl Compress {
     /// Compresses and writes.
     ///
@@ -182,7 +164,7 @@ impl Compress {
         }
         let scene = scene.into_runtime().map_err(|error| Failure::at(out, &error))?;
         let errors = match &originals {
-            Some(originals) => originals.errors(&mut self.engine.open(&self.given, &[])?, &scene, progress)?,
+            Some(originals) => originals.errors(&mut self.engine.open(&self.given)?, &scene, progress)?,
             None => Vec::new(),
         };
 
@@ -202,9 +184,14 @@ impl Compress {
             bytes(report.memory_before as u64),
             bytes(report.memory_after as u64),
         );
+        if report.fillers > 0 {
+            let reason = "they fill blocks, since some Gaussians are far from the others";
+            text += &format!("{} invisible Gaussians were added: {reason}\n", report.fillers);
+        }
         let psnr: Vec<f64> = errors.iter().map(SquaredError::psnr).collect();
+        let all: SquaredError = errors.into_iter().collect();
+        let warnings = self.warnings(&scene, (!psnr.is_empty()).then(|| all.psnr()));
         if let Some(lowest) = psnr.iter().copied().reduce(f64::min) {
-            let all: SquaredError = errors.into_iter().collect();
             let (views, pooled) = (psnr.len(), all.psnr());
             text += &match all.is_identical() {
                 true => format!("{views} views are identical to the original\n"),
@@ -224,25 +211,32 @@ impl Compress {
             "settings": settings,
             "report": report,
             "psnr_to_original": psnr,
+            "warnings": warnings,
         });
         Ok(Report::new(json, text))
     }
 
+    /// Prints and returns what the quality promises and the compressed scene does not keep; nothing if single options replace
+    /// those of the quality. `psnr` is that of all pictures to those of the original, dB.
+    fn warnings(&self, scene: &RuntimeScene, psnr: Option<f64>) -> Vec<String> {
+        let is_of_quality = self.knobs.settings(self.quality) == CompressSettings::from(self.quality);
+        let warnings = match &scene.form {
+            Form::Packed(packed) if is_of_quality => broken_promises(self.quality, packed, psnr),
+            Form::Packed(_) | Form::Sliced(_) => Vec::new(),
+        };
+        warnings.iter().for_each(|warning| note(&format!("warning: {warning}")));
+        warnings
+    }
+
     /// Checks that every option has an effect.
     fn check_options(&self) -> Result<(), Failure> {
-        self.engine.check(&self.given, &[])?;
-        if self.verify == 0 {
-            self.given.none_of(&OF_VERIFYING, "with --verify 0: no view is drawn")?;
-        }
+        self.engine.check(&self.given)?;
+        self.given.require(Need::VerifiedViews, self.verify > 0)?;
         let settings = self.knobs.settings(self.quality);
-        match (&settings.geometry, settings.codebooks.is_empty()) {
-            (None, _) => {
-                let knobs = [&OF_GEOMETRY[..], &OF_CODEBOOKS, &OF_WHOLE_COLORS].concat();
-                self.given.none_of(&knobs, "with --quality lossless, which changes no value")
-            }
-            (Some(_), false) => self.given.none_of(&OF_WHOLE_COLORS, "on colors that are coded by codebooks"),
-            (Some(_), true) => self.given.none_of(&OF_CODEBOOKS, "without codebooks, which --codebooks adds"),
-        }
+        let is_coded = !settings.codebooks.is_empty();
+        self.given.require(Need::Quantized, settings.geometry.is_some())?;
+        self.given.require(Need::WholeColors, !is_coded)?;
+        self.given.require(Need::Codebooks, is_coded)
     }
 
     /// Draws the views to compare with, of the original scene; `None` if there are none.
@@ -253,6 +247,6 @@ impl Compress {
         let shots = self.views.shots(scene, self.verify)?;
         let step = shots.len().div_ceil(self.verify).max(1);
         let views = shots.iter().step_by(step).map(|shot| shot.view(scene)).collect();
-        Ok(Some(Originals::draw(&mut self.engine.open(&self.given, &[])?, scene, views, progress)?))
+        Ok(Some(Originals::draw(&mut self.engine.open(&self.given)?, scene, views, progress)?))
     }
 }

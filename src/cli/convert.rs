@@ -3,7 +3,7 @@
 //! In: a scene, a target form, color degrees. Out: a package; a report of its training and playback settings and of the
 //! sizes before and after.
 
-use super::args::{CheckpointArgs, Given, PackageArgs, WITHOUT_TIME, file_size, values};
+use super::args::{CheckpointArgs, Given, Need, PackageArgs, file_size, values};
 use super::failure::Failure;
 use super::report::{Report, switches, switches_json};
 use super::table::{bytes, lines};
@@ -53,9 +53,7 @@ impl Convert {
     /// # Errors
     /// The scene cannot be read or converted, or the package cannot be written.
     pub(super) fn run(&self) -> Result<Report, Failure> {
-        if self.sh_degree.is_some_and(|degree| degree < 3) {
-            self.given.none_of(&["--sh-degree-t"], WITHOUT_TIME)?;
-        }
+        self.given.require(Need::ColorInTime, self.sh_degree.is_none_or(|degree| degree >= 3))?;
         let out = self.package.checked_out(Files::default().reads_scene(&self.input))?;
         let before = file_size(&self.input)?;
         let (form, sh_degree, sh_degree_t, merge) = (self.form, self.sh_degree, self.sh_degree_t, self.merge);

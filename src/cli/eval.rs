@@ -3,7 +3,7 @@
 //! In: a scene, a split with its images. Out: the metrics of every view and of all views, over the background of training and over a
 //! contrasting one; with `--out` a picture for each view: reference, render, amplified difference; or the part of one shard of the views.
 
-use super::args::{CheckpointArgs, DesignArgs, EngineArgs, Given, PART, Portion, ShardArgs, SplitArgs, values};
+use super::args::{CheckpointArgs, DesignArgs, EngineArgs, Given, Need, PART, Portion, ShardArgs, SplitArgs, values};
 use super::failure::Failure;
 use super::progress::Bars;
 use super::report::{Report, part_report, switches_json};
@@ -99,17 +99,15 @@ fn metric_set(list: &[Metric]) -> MetricSet {
     MetricSet { ssim: has(Metric::Ssim), ms_ssim: has(Metric::MsSsim), flip: has(Metric::Flip) }
 }
 
-/// The options of drawing that have an effect on a GPU alone.
-const OF_DRAWING: [&str; 1] = ["--renderer"];
-
 impl Eval {
     /// Draws, compares and tabulates.
     ///
     /// # Errors
     /// A scene or views that cannot be used, missing images, pictures that cannot be written, a failure of the engine.
     pub(super) fn run(&self) -> Result<Report, Failure> {
-        self.engine.check(&self.given, &OF_DRAWING)?;
-        self.shards.check(&self.given, &["--gain"])?;
+        self.engine.check(&self.given)?;
+        self.shards.check(&self.given)?;
+        [Need::Playback, Need::UpAxis].into_iter().try_for_each(|need| self.given.require(need, false))?;
         let files = self.data.add_to(Files::default().reads_scene(&self.scene));
         let pictures = match self.shards.portion() {
             Portion::All => self.out.as_deref(),
@@ -118,7 +116,7 @@ impl Eval {
                 None
             }
             Portion::Parts(_) => {
-                self.given.none_of(&["--out", "--gain"], "with --merge, which draws no pictures")?;
+                self.given.require(Need::WrittenPictures, false)?;
                 None
             }
         };
@@ -128,6 +126,7 @@ impl Eval {
         let progress = &mut Bars::default();
         let scene = self.checkpoint.load(&self.scene)?;
         let mut scene = scene.into_runtime().map_err(|error| Failure::at(&self.scene, &error))?;
+        self.given.require(Need::Filter, scene.filter.is_some())?;
         if self.no_filter {
             let no_windows = require_no_windows(scene.filter.as_ref(), "--no-filter");
             no_windows.map_err(|error| Failure::at(&self.scene, &error))?;
@@ -137,7 +136,7 @@ impl Eval {
         dataset.views = subset(dataset.views, self.views);
         dataset.require_images()?;
         let metrics = metric_set(&self.metrics);
-        let mut engine = self.engine.open(&self.given, &OF_DRAWING)?;
+        let mut engine = self.engine.open(&self.given)?;
         Pictures::evaluated(&dataset.views, metrics, pictures.is_some()).require(engine.headless(), BY_RESOLUTION)?;
         if let Some(out) = pictures {
             let pictures = dataset.views.iter().map(|view| picture_of(out, &view.name));

@@ -3,7 +3,7 @@
 //! In: a scene, a time, or frames a second. Out: a file of the Gaussians at that time, a folder with a file for each frame, or a file with all
 //! motion; a report of what the files do not show.
 
-use super::args::{CheckpointArgs, Given, file_size, values};
+use super::args::{CheckpointArgs, Given, Need, file_size, values};
 use super::failure::Failure;
 use super::progress::Bars;
 use super::report::Report;
@@ -21,7 +21,8 @@ use std::path::{Path, PathBuf};
 /// Write a capture in a format that other programs open: at one time, as a sequence of files, or with its motion.
 ///
 /// The extension of OUT names the format, unless --format does. What the format cannot hold is reported. Files are written to temporary files
-/// and renamed when they are complete: an existing file is replaced or stays unchanged.
+/// and renamed when they are complete: an existing file is replaced or stays unchanged. PLY files keep the coordinates of the capture, and a comment
+/// says which axis points up; Gaussians are rotated for formats that have an axis of their own.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -66,10 +67,10 @@ impl ExportVerb {
     /// The scene cannot be read, has no equivalent in the format, or needs a time; files cannot be written.
     pub(super) fn run(&self) -> Result<Report, Failure> {
         let format = self.format()?;
-        if format.is_moving() {
-            let reason = format!("with {}, which has all times", format.name);
-            self.given.none_of(&["--time", "--sequence"], &reason)?;
-        }
+        let plays = self.sequence || format.is_moving();
+        self.given.require(Need::OneTime, !format.is_moving())?;
+        self.given.require(Need::Background, false)?;
+        self.given.require(Need::Playback, plays || self.time.is_none())?;
         let files = Files::default().reads_scene(&self.scene);
         // A wrong path is reported before the scene is read.
         if self.sequence {
@@ -77,7 +78,8 @@ impl ExportVerb {
         } else {
             files.clone().writes(&self.out, last_extension(format)).check()?;
         }
-        let scene = self.checkpoint.load(&self.scene)?;
+        // A .4dgs file has seconds.
+        let scene = self.checkpoint.load_to_play(&self.scene, plays && format.id != "4dgs")?;
         let fps = self.checkpoint.fps.unwrap_or(FPS);
         let (interval, seconds) = (scene.trained_with.time_interval, scene.playback.duration_seconds);
         let shown = if self.sequence {

@@ -3,7 +3,9 @@
 //! In: a scene in the trained form, training views with their images. Out: a package in the trained form, or in the packed form with
 //! `--compress`, and its quality before, during and after training.
 
-use super::args::{CheckpointArgs, Given, PackageArgs, RendererArgs, SplitArgs, TrainingArgs, ValidationArgs, values};
+use super::args::{
+    CheckpointArgs, Given, Need, PackageArgs, RendererArgs, SplitArgs, TrainingArgs, ValidationArgs, values,
+};
 use super::curve::curve_table;
 use super::exposures::exposure_row;
 use super::failure::Failure;
@@ -11,7 +13,7 @@ use super::interrupt;
 use super::progress::Bars;
 use super::report::Report;
 use super::table::{bytes, lines};
-use crate::gaussian::GradientMode;
+use crate::gaussian::{GradientMode, Model};
 use crate::offline::belonging::require_belonging_on_gpu;
 use crate::offline::dataset::Validation;
 use crate::offline::engine::AdapterDescription;
@@ -19,10 +21,12 @@ use crate::offline::files::Files;
 use crate::offline::fine_tune::{
     FineTuneSettings, FineTuned, ImageRoom, Rates, Resume, Terms, TrainingImages, fine_tune,
 };
+use crate::offline::gaps::have_gaps;
 use crate::offline::quantize::{CompressSettings, Quality};
 use crate::offline::store::{Key, Store};
 use crate::offline::temporal_filter::needs_views;
 use crate::offline::{OfflineError, trained_pixel};
+use crate::scene::GaussianScene;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -113,15 +117,16 @@ impl FineTune {
         let out = self.package.checked_file(self.data.add_to(Files::default().reads_scene(&self.input)))?;
         let store = Store::beside(out, ".tune")?;
         let mut scene = self.checkpoint.load_to_change(&self.input)?;
-        if !scene.filter.as_ref().is_some_and(|filter| needs_views(filter.kind)) {
-            let reason = "on a scene without a temporal filter of the kind key-frame or interval";
-            self.given.none_of(&["--refresh-filter"], reason)?;
-        }
+        self.require_scene(&scene)?;
         if let Some(background) = self.checkpoint.background {
             scene.trained_with.background = background;
         }
         let (gaussians, progress) = (scene.len(), &mut Bars::default());
         let splits = self.data.divide(self.validation, &scene.trained_with, progress)?;
+        self.given.require(Need::ValidationViews, !splits.validation.is_empty())?;
+        if self.given.depends_on(Need::Gaps) {
+            self.given.require(Need::Gaps, have_gaps(&splits.train, progress)?)?;
+        }
         scene.trained_with.validation = Some(splits.to_string());
         let views = splits.all_training(&scene.trained_with, progress)?;
         scene.trained_with.pixel = trained_pixel(&scene, &views).or(scene.trained_with.pixel);
@@ -213,16 +218,17 @@ impl FineTune {
 
     /// Checks that every option has an effect.
     fn check_options(&self) -> Result<(), Failure> {
-        if self.validation.validation == Validation::None {
-            self.given.none_of(&["--patience"], "with --validation none: no evaluation is compared with another")?;
-        }
-        match self.compress {
-            Some(quality) if CompressSettings::from(quality).codebooks.is_empty() => {
-                let reason = "with a quality without codebooks: --compress small and balanced have some";
-                self.given.none_of(&["--compress-steps", "--round-geometry"], reason)
-            }
-            _ => Ok(()),
-        }
+        self.given.require(Need::ValidationViews, self.validation.validation != Validation::None)?;
+        let is_coded = |quality: Quality| !CompressSettings::from(quality).codebooks.is_empty();
+        self.given.require(Need::TrainedCodebooks, self.compress.is_none_or(is_coded))
+    }
+
+    /// Checks that every option has an effect on this scene.
+    fn require_scene(&self, scene: &GaussianScene) -> Result<(), Failure> {
+        let is_refreshed = scene.filter.as_ref().is_some_and(|filter| needs_views(filter.kind));
+        self.given.require(Need::SeenFilter, is_refreshed)?;
+        self.given.require(Need::OpenBackground, scene.environment.is_none())?;
+        self.given.require(Need::Motion, scene.model().is_none_or(|model| model == Model::Rotated4d))
     }
 
     fn settings(&self) -> FineTuneSettings {

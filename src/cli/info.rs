@@ -2,7 +2,7 @@
 //!
 //! In: a file. Out: its properties, its bounds, and for packages the sections and whether their checksums are correct.
 
-use super::args::{CheckpointArgs, file_size};
+use super::args::{CheckpointArgs, Given, Need, file_size};
 use super::failure::Failure;
 use super::info_dataset;
 use super::report::{Report, switches, switches_json};
@@ -13,7 +13,7 @@ use crate::codec::package::{PackageInfo, StoredForm, StoredLevel};
 use crate::codec::text::printable;
 use crate::gaussian::Model;
 use crate::offline::convert::form_name;
-use crate::offline::dataset::Dataset;
+use crate::offline::dataset::{CameraOptions, Dataset};
 use crate::scene::packed::MAX_STAGES;
 use crate::scene::{Bounds, ColorDegrees, GaussianScene, Level, PlaybackHints, SceneForm, TrainedWith};
 use glam::Vec3;
@@ -33,12 +33,17 @@ Examples:
   gs4d info chkpnt30000.pth --time-interval 0,10 --json
   gs4d info dataset --cameras cameras.png")]
 pub(super) struct Info {
+    #[command(flatten)]
+    given: Given,
     /// The capture, or the folder of a dataset.
     #[arg(value_name = "FILE")]
     file: PathBuf,
     /// Draw the cameras of a dataset into this picture, from above and from the side.
     #[arg(long, value_name = "PICTURE.png")]
     cameras: Option<PathBuf>,
+    /// Read every view of a dataset at time 0, as of a scene at rest; images in subfolders of a COLMAP dataset are then no frames of cameras.
+    #[arg(id = "static", long = "static")]
+    is_static: bool,
     #[command(flatten)]
     checkpoint: CheckpointArgs,
 }
@@ -81,11 +86,11 @@ impl Info {
     /// The file cannot be read. If sections are damaged or a Gaussian cannot be drawn, the result is a report with a failure.
     pub(super) fn run(&self) -> Result<Report, Failure> {
         if self.file.is_dir() && (Dataset::format(&self.file).is_some() || codec::inspect(&self.file).is_err()) {
-            return info_dataset::run(&self.file, self.cameras.as_deref());
+            self.given.require(Need::Capture, false)?;
+            let options = CameraOptions { is_static: self.is_static, ..CameraOptions::default() };
+            return info_dataset::run(&self.file, &options, self.cameras.as_deref());
         }
-        if self.cameras.is_some() {
-            return Err(Failure::about(&self.file, "is not the folder of a dataset, which --cameras needs"));
-        }
+        self.given.require(Need::Dataset, false)?;
         let size = file_size(&self.file)?;
         let (format, package) = codec::inspect(&self.file)?;
         if let Some(info) = package.as_ref().filter(|info| !info.is_intact()) {
@@ -285,8 +290,12 @@ fn package_json(info: &PackageInfo) -> Value {
     })
 }
 
+/// Returns the corners of a box with three decimals, and with more of a box smaller than a tenth of a unit.
 fn corners(bounds: &Bounds) -> String {
-    let corner = |Vec3 { x, y, z }: Vec3| format!("({x:.3}, {y:.3}, {z:.3})");
+    let side = (bounds.max - bounds.min).max_element();
+    let smaller = if side > 0.0 { (-side.log10()).clamp(0.0, 9.0) as usize } else { 0 };
+    let decimals = 3 + smaller;
+    let corner = |Vec3 { x, y, z }: Vec3| format!("({x:.decimals$}, {y:.decimals$}, {z:.decimals$})");
     format!("{} to {}", corner(bounds.min), corner(bounds.max))
 }
 

@@ -1,10 +1,12 @@
 //! `gs4d info DATASET`: shows what a dataset folder holds.
 //!
-//! In: a folder, the path of a picture. Out: its format, cameras, times, sizes, splits and what is missing; the cameras drawn into the picture.
+//! In: a folder, how it is read, the path of a picture. Out: its format, cameras, times, sizes, splits, what is missing and what was assumed; the
+//! cameras drawn into the picture.
 
 use super::failure::Failure;
 use super::report::Report;
 use super::table::{Table, lines};
+use crate::offline::dataset::CameraOptions;
 use crate::offline::dataset::drawing::draw;
 use crate::offline::dataset::summary::{SplitSummary, Summary};
 use crate::offline::files::Files;
@@ -17,10 +19,10 @@ use std::path::Path;
 ///
 /// # Errors
 /// A folder that is no dataset or cannot be read, a picture that cannot be written.
-pub(super) fn run(folder: &Path, picture: Option<&Path>) -> Result<Report, Failure> {
+pub(super) fn run(folder: &Path, options: &CameraOptions, picture: Option<&Path>) -> Result<Report, Failure> {
     let files = Files::default().reads_data(folder);
     picture.iter().fold(files, |files, path| files.writes(path, "png")).check()?;
-    let summary = Summary::of(folder)?;
+    let summary = Summary::of(folder, options)?;
     if let Some(path) = picture {
         write_png(path, &draw(&summary.cameras))?;
     }
@@ -36,6 +38,7 @@ pub(super) fn run(folder: &Path, picture: Option<&Path>) -> Result<Report, Failu
         ("points", summary.points.as_ref().map_or("none".to_owned(), |path| path.display().to_string())),
     ];
     pairs.extend(picture.map(|path| ("picture", path.display().to_string())));
+    pairs.extend(summary.notes.iter().map(|sentence| ("note", sentence.clone())));
     pairs.extend(summary.missing.iter().map(|sentence| ("missing", sentence.clone())));
     let mut table = Table::new(&["split", "views", "cameras", "times"]);
     for split in &summary.splits {
@@ -60,6 +63,7 @@ pub(super) fn run(folder: &Path, picture: Option<&Path>) -> Result<Report, Failu
         "masks": summary.masks,
         "points": summary.points.as_ref().map(|path| path.display().to_string()),
         "splits": summary.splits.iter().map(split).collect::<Vec<Value>>(),
+        "notes": summary.notes,
         "missing": summary.missing,
         "picture": picture.map(|path| path.display().to_string()),
     });

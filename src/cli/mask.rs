@@ -3,7 +3,7 @@
 //! In: a scene, a number of key-frames, training views if the filter needs them. Out: a package with the filter, and a
 //! report with the share of active Gaussians; or the part of one shard of the views.
 
-use super::args::{CheckpointArgs, DataArgs, EngineArgs, Given, PART, PackageArgs, Portion, ShardArgs, values};
+use super::args::{CheckpointArgs, DataArgs, EngineArgs, Given, Need, PART, PackageArgs, Portion, ShardArgs, values};
 use super::failure::Failure;
 use super::progress::Bars;
 use super::report::{Report, part_report};
@@ -92,7 +92,7 @@ impl Mask {
             Vec::new()
         };
         let keys = self.keys(&views)?;
-        let mut engine = if by_views { self.engine.open(&self.given, &[])? } else { Engine::Cpu };
+        let mut engine = if by_views { self.engine.open(&self.given)? } else { Engine::Cpu };
         let (kind, progress) = (self.filter, &mut Bars::default());
         let about_input = |error: OfflineError| Failure::at(&self.input, &error);
         let filter = match self.shards.portion() {
@@ -142,17 +142,11 @@ impl Mask {
 
     /// Checks that every option has an effect.
     fn check_options(&self) -> Result<(), Failure> {
-        self.engine.check(&self.given, &[])?;
-        if needs_views(self.filter) {
-            return Ok(());
-        }
-        let name = filter_name(self.filter);
-        let drawn = ["--size", "--resolution", "--engine", "--adapter", "--checks", "--shard", "--merge"];
-        self.given.none_of(&drawn, &format!("with --filter {name}: no view is drawn"))?;
-        match self.every {
-            Some(_) => Ok(()),
-            None => self.given.none_of(&["--data"], &format!("with --filter {name} unless --every is given")),
-        }
+        self.engine.check(&self.given)?;
+        self.shards.check(&self.given)?;
+        let by_views = needs_views(self.filter);
+        self.given.require(Need::FilteredViews, by_views)?;
+        self.given.require(Need::KeyFrameViews, by_views || self.every.is_some())
     }
 
     /// Returns the number of key-frames.

@@ -25,11 +25,14 @@ mod info;
 mod info_dataset;
 mod interrupt;
 mod mask;
+mod near;
 mod note;
 mod places;
 mod plain;
 mod progress;
 mod prune;
+#[cfg(test)]
+mod remedies;
 mod render;
 mod report;
 mod score;

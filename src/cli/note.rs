@@ -4,15 +4,19 @@
 
 use super::{plain, system};
 use indicatif::MultiProgress;
+use std::collections::HashSet;
 use std::io::{Write, stderr};
-use std::sync::LazyLock;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{LazyLock, Mutex, PoisonError};
 
 /// All progress bars on the screen.
 pub(super) static BARS: LazyLock<MultiProgress> = LazyLock::new(MultiProgress::new);
 
 /// Whether progress bars are hidden.
 static SILENT: AtomicBool = AtomicBool::new(false);
+
+/// The lines of [`note_once`].
+static WRITTEN: Mutex<Option<HashSet<String>>> = Mutex::new(None);
 
 /// Sets whether progress bars are hidden from now on.
 pub(super) fn silence_progress(silent: bool) {
@@ -22,6 +26,17 @@ pub(super) fn silence_progress(silent: bool) {
 /// Writes a line to standard error, if it is open. Common errors of the operating system in the line are replaced by sentences.
 pub(super) fn note(line: &str) {
     let _ = BARS.suspend(|| writeln!(stderr(), "{}", plain::lines(&system::in_words(line))));
+}
+
+/// Writes a line as [`note`], unless it has been written by this function: several parts of a command may read one dataset.
+pub(super) fn note_once(line: &str) {
+    let is_new = {
+        let mut written = WRITTEN.lock().unwrap_or_else(PoisonError::into_inner);
+        written.get_or_insert_default().insert(line.to_owned())
+    };
+    if is_new {
+        note(line);
+    }
 }
 
 /// Returns whether progress bars are hidden.

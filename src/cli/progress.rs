@@ -4,7 +4,7 @@
 //! each note.
 
 use super::interrupt;
-use super::note::{BARS, is_silent, note};
+use super::note::{BARS, is_silent, note, note_once};
 use crate::offline::Progress;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
@@ -39,7 +39,8 @@ impl Progress for Bars {
     }
 
     fn note(&mut self, line: &str) {
-        note(line);
+        let write = if line.starts_with("note: ") { note_once } else { note };
+        write(line);
     }
 
     fn is_interrupted(&self) -> bool {

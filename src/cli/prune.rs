@@ -4,8 +4,8 @@
 //! remaining Gaussians, in their original order.
 
 use super::args::{
-    CheckpointArgs, DataArgs, EngineArgs, Given, PackageArgs, ScoringArgs, ValidationArgs, file_size, score_choice,
-    values,
+    CheckpointArgs, DataArgs, EngineArgs, Given, Need, PackageArgs, ScoringArgs, ValidationArgs, file_size,
+    score_choice, values,
 };
 use super::failure::Failure;
 use super::progress::Bars;
@@ -110,21 +110,11 @@ impl Prune {
 
     /// Checks that every option has an effect.
     fn check_options(&self) -> Result<(), Failure> {
-        self.engine.check(&self.given, &[])?;
+        self.engine.check(&self.given)?;
         self.scoring.check(&self.given, &[self.variant])?;
-        let compared = ["--validation", "--trust-images"];
-        match (&self.scores, self.variant) {
-            _ if self.max_loss.is_some() => Ok(()),
-            (Some(_), _) => {
-                let drawn = ["--data", "--size", "--resolution", "--engine", "--adapter", "--checks"];
-                let reason = "with --scores unless --max-loss is given: no view is drawn";
-                self.given.none_of(&[&drawn[..], &compared].concat(), reason)
-            }
-            (None, ScoreChoice::Auto) => Ok(()),
-            (None, _) => {
-                self.given.none_of(&compared, "without --max-loss or --variant auto: no pictures are compared")
-            }
-        }
+        let (by_loss, by_file) = (self.max_loss.is_some(), self.scores.is_some());
+        self.given.require(Need::PrunedViews, by_loss || !by_file)?;
+        self.given.require(Need::ComparedPictures, by_loss || by_file || self.variant == ScoreChoice::Auto)
     }
 
     /// Returns how many Gaussians to keep.
@@ -151,7 +141,7 @@ impl Prune {
         let subject = Subject::new(&self.input, scene, self.checkpoint.background)?;
         let (scoring, trust_images) = (self.scoring.settings(), self.validation.trust_images);
         let settings = PruneSettings { goal, score: self.variant, scoring, trust_images };
-        let engine = &mut self.engine.open(&self.given, &[])?;
+        let engine = &mut self.engine.open(&self.given)?;
         Ok(prune_by_views(engine, subject, &splits, given, &settings, progress)?)
     }
 }

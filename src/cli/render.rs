@@ -2,8 +2,9 @@
 //!
 //! In: a scene and views of it. Out: a folder of PNG files, and raw float32 ones with `--raw`.
 
-use super::args::{CheckpointArgs, RendererArgs, ViewArgs, values};
+use super::args::{CheckpointArgs, Given, Need, RendererArgs, ViewArgs, values};
 use super::failure::Failure;
+use super::near::NearSample;
 use super::progress::Bars;
 use super::report::{Report, switches, switches_json};
 use super::table::lines;
@@ -36,6 +37,8 @@ Examples:
 Raw pictures (.f32) are height x width x 3 little-endian float32 values, not clamped.
 The background is that of the capture (its environment map if it has one), or the color of --background.")]
 pub(super) struct Render {
+    #[command(flatten)]
+    given: Given,
     /// The package or checkpoint to draw.
     #[arg(value_name = "SCENE")]
     scene: PathBuf,
@@ -67,6 +70,9 @@ impl Render {
     /// A scene or views that cannot be used, a missing level or size of training pixels, pictures that cannot be written, no such adapter, a
     /// failure of the GPU.
     pub(super) fn run(&self) -> Result<Report, Failure> {
+        self.given.require(Need::AllGaussians, self.level.is_none())?;
+        self.given.require(Need::Playback, false)?;
+        self.given.require(Need::UpAxis, self.views.are_of_orbit())?;
         let files = self.views.add_to(Files::default().reads_scene(&self.scene));
         files.clone().writes_folder(&self.out, []).check()?;
         let (scene, headless) = std::thread::scope(|scope| {
@@ -81,13 +87,15 @@ impl Render {
             Ok::<_, Failure>((scene, opening.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))))
         })?;
         let drawn = self.drawn(&scene)?;
-        // The size with which games draw this level.
-        let trained_pixel = scene.antialias_pixel(self.level.unwrap_or(0), self.antialias);
-        if self.antialias && trained_pixel.is_none() {
-            return Err(Failure::about(
-                &self.scene,
-                "does not have the size of its training pixels, which --antialias needs: add it with gs4d detail --data DIR",
-            ));
+        let level = self.level.unwrap_or(0);
+        if self.antialias && scene.antialias_pixel(level, true).is_none() {
+            // Levels of detail need a capture without an environment map.
+            let remedy = match scene.environment {
+                Some(_) => "gs4d bake --data DIR makes a package with it",
+                None => "add it with gs4d detail --data DIR",
+            };
+            let reason = "does not have the size of its training pixels, which --antialias needs";
+            return Err(Failure::about(&self.scene, &format!("{reason}: {remedy}")));
         }
         let shots = self.views.shots(&scene, 1)?;
         files.writes_folder(&self.out, shots.iter().flat_map(|shot| self.paths(shot))).check()?;
@@ -95,25 +103,29 @@ impl Render {
         let mut headless = headless?;
         let capture = headless.upload(drawn)?;
         let background = self.checkpoint.background.map_or(scene.trained_background(), Background::Color);
+        // As games draw this level.
+        let optics = scene.optics(level, self.antialias);
         let with_view = |shot: Shot| {
-            let view = shot.view(&scene).antialiased(trained_pixel);
+            let view = shot.camera.view(shot.time, optics);
             (shot, view)
         };
         let views: Vec<(Shot, View)> = shots.into_iter().map(with_view).collect();
         let mut text = lines(&switches(&scene.trained_with, &scene.playback));
         let switches = switches_json(&scene.trained_with, &scene.playback);
+        let sample = NearSample::of(drawn);
         drop(scene);
 
         let start = Instant::now();
         let write = |shot: &Shot, picture: &Picture| self.write(shot, picture);
         let counts = render_shots(&mut headless, &capture, background, &views, write, &mut Bars::default())?;
         let seconds = start.elapsed().as_secs_f64();
+        sample.point_out(&views, &counts);
         let frames: Vec<Value> = views.iter().zip(&counts).map(|(view, counts)| self.frame(view, counts)).collect();
         let (count, adapter) = (frames.len(), AdapterDescription::of(&headless));
         text += &format!("\n{count} pictures in {}, {seconds:.1} s on {adapter}\n", self.out.display());
         let json = json!({
             "scene": self.scene.display().to_string(),
-            "level": self.level.unwrap_or(0),
+            "level": level,
             "out": self.out.display().to_string(),
             "adapter": adapter,
             "seconds": seconds,
@@ -128,6 +140,10 @@ impl Render {
         let Some(level) = self.level else { return Ok(scene) };
         let count = scene.levels.len();
         match count {
+            0 if scene.environment.is_some() => {
+                let reason = "has no levels of detail, and can have none with its environment map: leave out --level";
+                Err(Failure::about(&self.scene, reason))
+            }
             0 => Err(Failure::about(&self.scene, "has no levels of detail: make them with gs4d detail")),
             _ if level > count => {
                 Err(Failure::about(&self.scene, &format!("has no level of detail {level}; the coarsest is {count}")))

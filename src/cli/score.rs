@@ -4,8 +4,8 @@
 //! each score; or the part of one shard.
 
 use super::args::{
-    CheckpointArgs, DataArgs, EngineArgs, Given, PART, Portion, ScoringArgs, ShardArgs, ValidationArgs, score_choice,
-    values,
+    CheckpointArgs, DataArgs, EngineArgs, Given, Need, PART, Portion, ScoringArgs, ShardArgs, ValidationArgs,
+    score_choice, values,
 };
 use super::failure::Failure;
 use super::progress::Bars;
@@ -17,7 +17,7 @@ use crate::offline::engine::Engine;
 use crate::offline::files::Files;
 use crate::offline::memory_check::{BY_RESOLUTION, Pictures};
 use crate::offline::score::{Scores, Variant, parts, write_scores};
-use crate::offline::search::{Candidate, Goal, ScoreChoice, ScoreSearch, SearchSummary, candidates};
+use crate::offline::search::{Candidate, Goal, ScoreChoice, ScoreSearch, SearchSummary, candidates, no_validation};
 use crate::offline::shard::Shard;
 use crate::scene::GaussianScene;
 use serde_json::json;
@@ -68,19 +68,6 @@ pub(super) struct Score {
     checkpoint: CheckpointArgs,
 }
 
-/// The options, beside those of checkpoints, that have an effect on scoring alone, and not on parts.
-const OF_SCORING: [&str; 9] = [
-    "--data",
-    "--size",
-    "--resolution",
-    "--views",
-    "--volume-power",
-    "--volume-rank",
-    "--engine",
-    "--adapter",
-    "--checks",
-];
-
 impl Score {
     /// Scores and writes.
     ///
@@ -105,7 +92,7 @@ impl Score {
             (self.data.open(&scene.trained_with, progress)?, Vec::new())
         };
         let subject = Subject::new(input, scene, self.checkpoint.background)?;
-        let mut engine = self.engine.open(&self.given, &[])?;
+        let mut engine = self.engine.open(&self.given)?;
         let label = |engine: &Engine, shard| parts::label(input, &subject, &scored, &scoring, engine, shard);
         let start = Instant::now();
         if let Portion::Shard(shard) = self.shards.portion() {
@@ -113,6 +100,9 @@ impl Score {
             let written = parts::write(&self.out, &label, &scoring, &mut engine, &subject, &scored, progress)?;
             let work = written.then(|| (start.elapsed().as_secs_f64(), engine.name()));
             return Ok(part_report(shard, &self.out, work));
+        }
+        if auto && validation.is_empty() {
+            return Err(no_validation(false).into());
         }
         Pictures::compared(&validation).require(engine.headless(), BY_RESOLUTION)?;
         if auto && !self.validation.trust_images {
@@ -175,25 +165,17 @@ impl Score {
 
     /// Checks that every option has an effect.
     fn check_options(&self) -> Result<(), Failure> {
-        self.engine.check(&self.given, &[])?;
+        self.engine.check(&self.given)?;
         self.scoring.check(&self.given, &[self.variant])?;
-        self.shards.check(&self.given, &["--ratio", "--trust-images"])?;
-        if self.input.is_none() {
-            if self.variant == ScoreChoice::Auto {
-                let message =
-                    "auto draws views to compare scores: give the CHECKPOINT and --data, too, or another --variant";
-                return Err(Failure::new(message));
-            }
-            let reason = "on parts alone: it is checked if the CHECKPOINT is given, too";
-            self.given.none_of(&[&OF_SCORING[..], &CheckpointArgs::OF_CHECKPOINTS].concat(), reason)?;
+        self.shards.check(&self.given)?;
+        if self.input.is_none() && self.variant == ScoreChoice::Auto {
+            let message =
+                "auto draws views to compare scores: give the CHECKPOINT and --data, too, or another --variant";
+            return Err(Failure::new(message));
         }
-        match self.variant {
-            ScoreChoice::Auto => Ok(()),
-            ScoreChoice::All | ScoreChoice::One(_) => {
-                let compared = ["--ratio", "--validation", "--trust-images"];
-                self.given.none_of(&compared, "without --variant auto, which alone compares scores")
-            }
-        }
+        self.given.require(Need::Work, self.input.is_some())?;
+        self.given.require(Need::ComparedScores, self.variant == ScoreChoice::Auto)?;
+        [Need::Playback, Need::UpAxis].into_iter().try_for_each(|need| self.given.require(need, false))
     }
 
     /// Returns the files that are read and those that may be written.

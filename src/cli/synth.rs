@@ -2,7 +2,7 @@
 //!
 //! In: a number of Gaussians and a seed, or a capture to grow. Out: a package in the trained form, for tests and benchmarks.
 
-use super::args::{CheckpointArgs, Given, PackageArgs, WITHOUT_TIME, values};
+use super::args::{CheckpointArgs, Given, Need, PackageArgs, values};
 use super::failure::Failure;
 use super::report::Report;
 use super::table::{bytes, lines};
@@ -55,9 +55,7 @@ impl Synth {
     /// # Errors
     /// The capture to grow cannot be read, or the package cannot be written.
     pub(super) fn run(&self) -> Result<Report, Failure> {
-        if self.sh_degree < 3 {
-            self.given.none_of(&["--sh-degree-t"], WITHOUT_TIME)?;
-        }
+        self.given.require(Need::ColorInTime, self.sh_degree >= 3)?;
         let capture = self.grow.as_deref().and_then(<[OsString]>::last).map(Path::new);
         let files = capture.into_iter().fold(Files::default(), Files::reads_scene);
         let out = self.package.checked_out(files)?;

@@ -3,7 +3,7 @@
 //! In: training views with their images. Out: a package in the trained form, rewritten while training goes on, and its quality at each
 //! evaluation.
 
-use super::args::{Given, PackageArgs, RendererArgs, SplitArgs, TrainingArgs, WITHOUT_TIME, values};
+use super::args::{Given, Need, PackageArgs, RendererArgs, SplitArgs, TrainingArgs, values};
 use super::curve::curve_table;
 use super::exposures::exposure_row;
 use super::failure::Failure;
@@ -16,6 +16,8 @@ use crate::offline::dataset::Validation;
 use crate::offline::engine::AdapterDescription;
 use crate::offline::files::Files;
 use crate::offline::fine_tune::{Cloning, FineTuneSettings, FineTuned, Growth, Rates, Terms};
+use crate::offline::gaps::have_gaps;
+use crate::offline::splits::Splits;
 use crate::offline::store::Store;
 use crate::offline::train::{CaptureSettings, Start, StartSettings, TrainSettings, TrainedCapture, Training};
 use serde_json::json;
@@ -51,9 +53,9 @@ pub(super) struct Train {
     /// Skip the check, after 1000 steps or more, that the capture shows the images, which fails if the poses are those of other images.
     #[arg(long, help_heading = "Validation")]
     trust_images: bool,
-    /// First and last time of the capture [default: 0,1 if no view is outside, else from the first view to the last].
+    /// First and last time of the capture, as the dataset counts times [default: 0,1 if no view is outside, else from the first view to the last].
     #[arg(long, value_name = "T0,T1", value_parser = values::interval, allow_hyphen_values = true)]
-    time_interval: Option<[f32; 2]>,
+    time_interval: Option<[f64; 2]>,
     /// Seconds of one pass through the time interval at speed 1, 0 for a still [default: as the dataset says, else the interval's length].
     #[arg(long, value_name = "SECONDS", value_parser = values::seconds)]
     duration: Option<f32>,
@@ -168,6 +170,11 @@ impl Train {
         let progress = &mut Bars::default();
         let settings = self.settings();
         let training = Training::open(&settings, progress)?;
+        let Splits { train, validation, .. } = training.splits();
+        self.given.require(Need::ValidationViews, !validation.is_empty())?;
+        if self.given.depends_on(Need::Gaps) {
+            self.given.require(Need::Gaps, have_gaps(train, progress)?)?;
+        }
         let mut headless = self.renderer.open()?;
         let deferred = interrupt::defer();
         let trained = training.run(&mut headless, &store, out, progress)?;
@@ -233,25 +240,17 @@ impl Train {
 
     /// Checks that every option has an effect.
     fn check_options(&self) -> Result<(), Failure> {
-        if self.validation == Validation::None {
-            self.given.none_of(&["--patience"], "with --validation none: no evaluation is compared with another")?;
-        }
-        if self.densify == Densify::Original {
-            let reason = "with --densify original, which neither relocates nor moves Gaussians at random";
-            self.given.none_of(&["--relocate-every", "--noise", "--dropout"], reason)?;
-            let reason = "with --densify original: places without a Gaussian would be neighbors";
-            self.given.none_of(&["--rigid-weight"], reason)?;
-        }
-        if matches!(self.start, Start::Hull | Start::Random) {
-            self.given.none_of(&["--points"], &format!("with --start {}", self.start.name()))?;
-        }
-        if self.steps < CHECKED {
-            self.given.none_of(&["--trust-images"], "with fewer than 1000 steps, after which nothing is checked")?;
-        }
-        match self.sh_degree < 3 {
-            true => self.given.none_of(&["--sh-degree-t"], WITHOUT_TIME),
-            false => Ok(()),
-        }
+        let relocates = self.densify == Densify::Relocate;
+        let needs = [
+            (Need::ValidationViews, self.validation != Validation::None),
+            (Need::Relocation, relocates),
+            (Need::FixedNumber, relocates),
+            (Need::StartAtPoints, !matches!(self.start, Start::Hull | Start::Random)),
+            (Need::CheckedSteps, self.steps >= CHECKED),
+            (Need::Degrees, self.sh_degree > 0),
+            (Need::ColorInTime, self.sh_degree >= 3),
+        ];
+        needs.into_iter().try_for_each(|(need, is_met)| self.given.require(need, is_met))
     }
 
     fn start_settings(&self) -> StartSettings {
@@ -277,6 +276,7 @@ impl Train {
                 time_interval: self.time_interval,
                 background: self.background,
                 duration_seconds: self.duration,
+                ..CaptureSettings::default()
             },
             start: self.start_settings(),
             points: self.points.clone(),

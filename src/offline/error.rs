@@ -117,12 +117,13 @@ pub enum OfflineError {
     /// A choice needs validation views, and the dataset has none.
     #[error(
         "{what} needs validation views, and this dataset has too few cameras and times to hold some out unasked (or --validation none is \
-         given): give --validation cameras or times, add a split `val` (Blender: transforms_val.json), or name \
-         the score and the count"
+         given): give --validation cameras or times, add a split `val` (Blender: transforms_val.json), or {instead}"
     )]
     NoValidation {
         /// The choice that needs validation views.
         what: &'static str,
+        /// What can be done without any, as an instruction.
+        instead: &'static str,
     },
     /// The user has interrupted the work. Stored results are kept, and the same work resumes from them.
     #[error("{INTERRUPTED}")]
@@ -145,6 +146,9 @@ pub enum OfflineError {
     /// Levels of detail of a scene with an environment map, which surrounds the camera at every distance.
     #[error("has an environment map, which surrounds the camera: levels of detail need a capture without one")]
     Surrounded,
+    /// Levels of detail of a scene of which nothing is drawn.
+    #[error("has no Gaussian that is drawn at any time, so that there is nothing to make levels of detail of")]
+    NothingDrawn,
     /// An orbit of a scene without Gaussians.
     #[error("the scene has no Gaussians, so that no orbit of cameras can be placed around it: give --cameras")]
     NothingToOrbit,

@@ -8,6 +8,7 @@
 //! |---|---|
 //! | [`dataset`], `splits` | reads views and divides them into training, validation and test views |
 //! | `belonging` | checks that images show the capture |
+//! | `gaps` | finds out whether images have transparent pixels or masks |
 //! | `picture_file` | decodes pictures for all other modules |
 //! | [`engine`] | opens the GPU or the CPU reference |
 //! | [`score`] | sums what every Gaussian contributes to the training views |
@@ -49,11 +50,13 @@ pub(crate) mod fidelity;
 pub(crate) mod files;
 pub mod fine_tune;
 pub(crate) mod fleet;
+pub(crate) mod gaps;
 pub(crate) mod jobs;
 pub(crate) mod layout;
 pub(crate) mod memory_check;
 pub mod metrics;
 pub(crate) mod names;
+mod node;
 pub mod orbit;
 mod package_size;
 pub(crate) mod picture_file;

@@ -185,6 +185,14 @@ pub struct SearchSummary {
     pub candidates: Vec<Outcome>,
 }
 
+/// Returns the error of a search without validation views: for a loss, or for the best score.
+pub(crate) fn no_validation(by_loss: bool) -> OfflineError {
+    match by_loss {
+        true => OfflineError::NoValidation { what: "the loss allowed", instead: "give --ratio or --keep in its place" },
+        false => OfflineError::NoValidation { what: "the best score", instead: "name a score with --variant" },
+    }
+}
+
 /// A search on validation views.
 #[derive(Debug)]
 pub struct ScoreSearch {
@@ -208,8 +216,7 @@ impl ScoreSearch {
         progress: &mut dyn Progress,
     ) -> Result<Self, OfflineError> {
         if validation.is_empty() {
-            let what = if required { "the loss allowed" } else { "the best score" };
-            return Err(OfflineError::NoValidation { what });
+            return Err(no_validation(required));
         }
         Pictures::compared(validation).require(engine.headless(), BY_RESOLUTION)?;
         match Evaluator::by_images(validation, &scene.trained_with, background) {

@@ -16,6 +16,7 @@ use glam::{UVec2, Vec3};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 /// Returns a scene and a dataset around `center`, which belongs to the scene if it is the origin.
 fn capture(center: Vec3, images: bool) -> Capture {
@@ -92,6 +93,7 @@ fn a_bake_writes_a_smaller_package_and_both_reports() {
     assert_eq!(report["variances"]["borders"].as_array().map(Vec::len), Some(41), "a histogram");
     assert_eq!(report["activity"]["after"]["overlap"][0], 1.0, "the overlap of the first set with itself");
     assert_eq!(report["bytes"]["after"], bytes(&out), "the size of the package");
+    assert!(report["warnings"].as_array().is_some_and(Vec::is_empty), "nothing to warn of: {}", report["warnings"]);
     let psnr = |side: &str| report["evaluation"][side]["mean"]["psnr"].as_f64().expect("a number");
     assert!(
         psnr("before") > 60.0 && psnr("after") > 35.0,
@@ -365,6 +367,37 @@ fn parts_shared_by_all_gaussians_count_once_for_the_target_size() {
     let (bytes, kept) = (json["bytes"]["after"].as_u64(), json["gaussians"]["after"].as_u64());
     assert!(bytes.is_some_and(|bytes| (one..=limit).contains(&bytes)), "within the target size: {bytes:?} of {limit}");
     assert!(kept.is_some_and(|kept| (100..1500).contains(&kept)), "between 100 and 1500 Gaussians fit: {kept:?}");
+}
+
+#[test]
+fn what_a_later_stage_would_refuse_is_refused_before_the_training() {
+    if GpuContext::headless(None).is_err() {
+        return no_gpu();
+    }
+    let scene = synthesize(&SynthSettings { count: 200, ..SynthSettings::default() });
+    // Too few cameras and times to hold some out unasked.
+    let few = Capture::new(scene.clone(), Vec3::ZERO, 3, 2, UVec2::splat(32), true);
+    let many = Capture::new(scene, Vec3::ZERO, 4, 4, UVec2::splat(32), true);
+    let bake = |capture: &Capture, more: &[&str]| {
+        let fixed = arguments!["bake", &capture.data, "-o", capture.out(), "--engine", "gpu"];
+        gs4d(&[fixed.to_vec(), more.iter().map(Into::into).collect()].concat())
+    };
+    let start = Instant::now();
+    bake(&few, &[]).must_fail("the loss allowed needs validation views");
+    bake(&few, &[]).must_fail("give --validation cameras or times");
+    bake(&few, &["--ratio", "0.5", "--variant", "auto"]).must_fail("the best score needs validation views");
+    let plan = few.path("plan.json").display().to_string();
+    bake(&few, &["--plan", &plan]).must_fail("the loss allowed needs validation views");
+    bake(&many, &["--validation", "none"]).must_fail("the loss allowed needs validation views");
+    bake(&many, &["--target-size", "0.0001"]).must_fail("a package without Gaussians has");
+    // Camera 2 of 4 is held out.
+    let image = many.data.join("train/c02_01.png");
+    fs::remove_file(&image).expect("the image exists");
+    bake(&many, &[]).must_fail("c02_01.png");
+    assert!(start.elapsed() < Duration::from_secs(60), "nothing was trained: {:?}", start.elapsed());
+    for capture in [&few, &many] {
+        assert_eq!(capture.left(), ["data", "scene.gs4d"], "no file of a training is left");
+    }
 }
 
 #[test]

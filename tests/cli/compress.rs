@@ -63,3 +63,50 @@ fn color_steps_are_normal_numbers_and_leave_colors_finite() {
         assert_eq!(info["package"]["intact"], true, "{step}: a package that can be read");
     }
 }
+
+#[test]
+fn strays_do_not_lower_the_quality_of_a_package() {
+    let folder = folder();
+    let out = folder.path().join("out.gs4d");
+    let far = changed(&folder, "far.gs4d", |trained| {
+        for index in (0..300).step_by(30) {
+            trained.parameters.mean[index] = [1e3 + index as f32, -300.0, 20.0 * index as f32];
+            trained.parameters.opacity_logit[index] = -3.0;
+        }
+    });
+    let run = gs4d(&arguments!["compress", &far, &out, "--engine", "cpu", "--orbit", "2", "--size", "60x60", "--json"]);
+    assert!(!run.err.contains("warning"), "the quality is kept: {}", run.err);
+    let report = run.json();
+    let psnr: Vec<f64> = serde_json::from_value(report["psnr_to_original"].clone()).expect("a number for each view");
+    assert!(psnr.len() == 2 && psnr.iter().all(|&psnr| psnr > 45.0), "what `balanced` promises: {psnr:?} dB");
+    assert_eq!(report["warnings"], serde_json::json!([]), "nothing to warn of");
+    let fillers = report["report"]["fillers"].as_u64().expect("a number of fillers");
+    assert!((1..256).contains(&fillers), "the last block before the strays is filled: {fillers}");
+    let info = gs4d(&arguments!["info", &out, "--json"]).json();
+    assert_eq!(info["package"]["intact"], true, "a package that can be read");
+}
+
+#[test]
+fn a_package_that_breaks_the_promise_of_its_quality_has_a_warning() {
+    let folder = folder();
+    let out = folder.path().join("out.gs4d");
+    let scattered = changed(&folder, "scattered.gs4d", |trained| {
+        for (index, mean) in trained.parameters.mean.iter_mut().enumerate() {
+            *mean = [7919, 6101, 3571].map(|factor| (index * factor % 1009) as f32 * 100.0);
+        }
+    });
+    let compress = |quality: &str| {
+        gs4d(&arguments!["compress", &scattered, &out, "--verify", "0", "--quality", quality, "--json"])
+    };
+    for quality in ["small", "balanced", "visually-lossless"] {
+        let run = compress(quality);
+        let (code, err) = (run.code, run.err.clone());
+        assert!(err.contains("warning: ") && err.contains("--quality lossless"), "{quality}, {code:?}: {err}");
+        let warnings = run.json()["warnings"].clone();
+        let warning = warnings[0].as_str().expect("a sentence");
+        assert!(warning.contains("% of the Gaussians"), "{quality}: the figure is stated: {warning}");
+    }
+    let run = compress("lossless");
+    assert!(!run.err.contains("warning"), "the way out works: {}", run.err);
+    assert_eq!(run.json()["warnings"], serde_json::json!([]), "nothing to warn of");
+}

@@ -1,8 +1,18 @@
 //! `info` on the folders of datasets.
 //!
-//! In: small datasets. Out: proof that counts, splits and missing files are shown, that cameras are drawn, and that wrong folders are refused.
+//! In: small datasets. Out: proof that counts, splits, missing files and what was assumed are shown, that cameras are drawn, and that wrong folders are
+//! refused.
 
-use crate::support::command::{arguments, folder, gs4d};
+use crate::support::capture::Capture;
+use crate::support::command::{arguments, folder, gs4d, scene};
+use crate::support::no_gpu::no_gpu;
+use bevy_gs4d::codec::package::WriteSettings;
+use bevy_gs4d::codec::{self, ReadOptions};
+use bevy_gs4d::offline;
+use bevy_gs4d::renderer::GpuContext;
+use bevy_gs4d::scene::Origin;
+use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use glam::{UVec2, Vec3};
 use serde_json::{Value, json};
 use std::fs;
 use std::path::Path;
@@ -77,4 +87,121 @@ fn info_decodes_no_video() {
     assert!(json["missing"].to_string().contains("2 videos have not been decoded"), "the videos are named: {json}");
     assert!(!json["missing"].to_string().contains("static"), "the times of videos are not known yet: {json}");
     assert!(!folder.path().join("data.frames").exists(), "no frames are written");
+}
+
+/// Writes a COLMAP model of images in the subfolders of these names, two in each, without images.
+fn write_colmap(folder: &Path, names: [&str; 2]) {
+    let model = folder.join("sparse/0");
+    fs::create_dir_all(&model).expect("the folder can be made");
+    fs::write(model.join("cameras.txt"), "1 PINHOLE 40 30 50 50 20 15\n").expect("the folder can be written to");
+    let image = |index: usize| {
+        let name = names[index / 2];
+        format!("{index} 1 0 0 0 {index} 0 3 1 {name}/{name}_{index}.png\n\n")
+    };
+    let images: String = (0..4).map(image).collect();
+    fs::write(model.join("images.txt"), images).expect("the folder can be written to");
+}
+
+#[test]
+fn what_was_assumed_of_a_dataset_is_shown() {
+    let folder = folder();
+    let data = folder.path().join("data");
+    write_colmap(&data, ["day", "night"]);
+    let json = gs4d(&arguments!["info", &data, "--json"]).json();
+    assert_eq!((&json["times"], json["notes"].as_array().map(Vec::len)), (&1.into(), Some(1)), "one time: {json}");
+    assert!(json["notes"][0].as_str().is_some_and(|note| note.contains("day, night")), "the folders: {json}");
+    write_colmap(&data, ["cam0", "cam1"]);
+    let text = gs4d(&arguments!["info", &data]).text();
+    assert!(text.contains("4 from 0 to 0.1") && text.contains("--static"), "frames of cameras: {text}");
+    let json = gs4d(&arguments!["info", &data, "--static", "--json"]).json();
+    assert_eq!((&json["times"], &json["notes"]), (&1.into(), &json!([])), "nothing is assumed");
+    gs4d(&arguments!["info", data.join("sparse/0/images.txt"), "--static"]).must_fail("--static");
+}
+
+#[test]
+fn what_was_assumed_of_a_dataset_is_a_note_of_each_command() {
+    let folder = folder();
+    let data = folder.path().join("data");
+    write_colmap(&data, ["cam0", "cam1"]);
+    let (scene, out) = (scene(&folder, "50"), folder.path().join("out.f32"));
+    let line = arguments!["score", scene, "--data", data, "--engine", "cpu", "--variant", "energy", "--out", out];
+    let run = gs4d(&line);
+    assert_eq!(run.err.matches("note: ").count(), 1, "one note: {}", run.err);
+    assert!(run.err.contains("data: images in subfolders (cam0, cam1; 2 in all)"), "the folder: {}", run.err);
+    let run = gs4d(&[&line[..], &arguments!["--static"]].concat());
+    assert_eq!((run.code, run.err.contains("note: ")), (Some(0), false), "nothing is assumed: {}", run.err);
+}
+
+/// A place in coordinates of UTM, and a time in seconds since 1970.
+const FAR: Origin = Origin { place: [500_000.0, 5_400_000.0, 300.0], time: 1_700_000_000.0 };
+
+/// Returns a capture of a synthetic scene, whose dataset is moved to [`FAR`], and the path of the scene with this origin.
+fn far_capture() -> (Capture, std::path::PathBuf) {
+    let mut trained = synthesize(&SynthSettings { count: 400, ..SynthSettings::default() });
+    let capture = Capture::new(trained.clone(), Vec3::ZERO, 3, 3, UVec2::splat(48), true);
+    for split in ["train", "test"] {
+        let path = capture.data.join(format!("transforms_{split}.json"));
+        let text = fs::read_to_string(&path).expect("the dataset was just written");
+        let mut json: Value = serde_json::from_str(&text).expect("JSON");
+        for frame in json["frames"].as_array_mut().expect("frames") {
+            frame["time"] = json!(frame["time"].as_f64().expect("a number") + FAR.time);
+            for (axis, from) in FAR.place.into_iter().enumerate() {
+                let at = &mut frame["transform_matrix"][axis][3];
+                *at = json!(at.as_f64().expect("a number") + from);
+            }
+        }
+        fs::write(path, json.to_string()).expect("the folder can be written to");
+    }
+    trained.trained_with.origin = FAR;
+    let scene = capture.path("far.gs4d");
+    offline::save(&scene, &trained, &WriteSettings::default()).expect("the folder can be written to");
+    (capture, scene)
+}
+
+#[test]
+fn datasets_far_from_0_are_read_from_the_origin_of_the_scene() {
+    let (capture, scene) = far_capture();
+    let run =
+        gs4d(&arguments!["eval", &scene, "--data", &capture.data, "--engine", "cpu", "--metrics", "psnr", "--json"]);
+    assert!(!run.err.contains("outside"), "every view is inside the time interval: {}", run.err);
+    let json = run.json();
+    let psnr = json["mean"]["psnr"].as_f64().expect("a number");
+    assert!(psnr > 55.0, "the scene is where its pictures show it, but for the rounding to 8 bits: {psnr} dB");
+    let (cameras, out) = (capture.data.join("transforms_test.json"), capture.path("pictures"));
+    let run = gs4d(&arguments!["render", &scene, "--cameras", &cameras, "--engine", "cpu", "--out", &out]);
+    assert!(!run.err.contains("outside"), "the times of a camera file are counted from the origin, too: {}", run.err);
+    run.text();
+
+    let json = gs4d(&arguments!["info", &capture.data, "--json"]).json();
+    assert_eq!(
+        (&json["cameras"], &json["times"]),
+        (&5.into(), &3.into()),
+        "the cameras and times are told apart: {json}"
+    );
+    assert_eq!(json["time_interval"], json!([0.0, 1.0]), "times are counted from the first");
+    let notes = json["notes"].to_string();
+    for part in ["500000, 5400000, 302", "1700000000"] {
+        assert!(notes.contains(part), "{part:?} is not in: {notes}");
+    }
+}
+
+#[test]
+fn a_capture_of_a_dataset_far_from_0_has_an_origin() {
+    if GpuContext::headless(None).is_err() {
+        no_gpu();
+        return;
+    }
+    let (capture, _) = far_capture();
+    let out = capture.path("trained.gs4d");
+    let command = arguments!["train", "--data", &capture.data, "-o", &out, "--gaussians", "50", "--sh-degree", "0"];
+    let more = ["--steps", "2", "--validation", "none", "--time-interval", "1700000000,1700000002", "--json"];
+    let run = gs4d(&[command.to_vec(), more.map(Into::into).to_vec()].concat());
+    assert_eq!(run.err.matches("500000, 5400000, 302").count(), 1, "the place is said once: {}", run.err);
+    assert_eq!(run.json()["time_interval"], json!([0.0, 2.0]), "an interval of the dataset, counted from its origin");
+    let found = codec::load(&out, &ReadOptions::default()).expect("a package").trained_with;
+    let expected = Origin { place: [500_000.0, 5_400_000.0, 302.0], ..FAR };
+    assert_eq!((found.origin, found.time_interval), (expected, [0.0, 2.0]), "the package has it");
+    let run = gs4d(&arguments!["eval", &out, "--data", &capture.data, "--metrics", "psnr", "--json"]);
+    assert!(!run.err.contains("outside"), "the dataset is read from the origin of the package: {}", run.err);
+    assert_eq!(run.json()["views"].as_array().map(Vec::len), Some(6), "every test view");
 }

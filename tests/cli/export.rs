@@ -5,7 +5,9 @@
 
 use crate::support::command::{arguments, folder, gs4d, scene};
 use crate::support::folders::contents;
+use std::ffi::OsString;
 use std::fs;
+use std::path::PathBuf;
 
 #[test]
 fn a_moment_is_exported_and_opened_again() {
@@ -57,6 +59,10 @@ fn a_sequence_is_a_folder_that_opens_as_one_capture() {
     let files = report["files"].as_array().expect("a list of files");
     assert_eq!(files.len(), 8, "eight frames in two seconds");
     let all: u64 = files.iter().filter_map(|file| file["gaussians"].as_u64()).sum();
+    // What macOS leaves on drives of other systems.
+    for hidden in ["._frame_00000.ply", ".DS_Store"] {
+        fs::write(frames.join(hidden), b"\x00\x05\x16\x07").expect("the folder can be written to");
+    }
     let info = gs4d(&arguments!["info", &frames, "--fps", "4", "--json"]).json();
     assert_eq!((&info["format"], &info["gaussians"]), (&"sequence".into(), &all.into()), "the Gaussians of all frames");
     assert_eq!(info["switches"]["playback"]["duration_seconds"], 2.0, "its length");
@@ -78,4 +84,20 @@ fn a_sequence_is_a_folder_that_opens_as_one_capture() {
     fs::create_dir(&other).expect("the folder can be made");
     gs4d(&arguments!["info", &other]).must_fail("other");
     gs4d(&arguments!["convert", &other, folder.path().join("other.gs4d")]).must_fail("frame_0001.ply");
+}
+
+#[test]
+fn the_axis_that_points_up_is_said_and_comes_back() {
+    let folder = folder();
+    let scene = scene(&folder, "60");
+    let [still, moving, frames] = ["still.ply", "moving.ftgs.ply", "frames"].map(|name| folder.path().join(name));
+    let cases: [(&PathBuf, &[&str]); 3] =
+        [(&still, &["--time", "0.5"]), (&moving, &[]), (&frames, &["--sequence", "--fps", "2"])];
+    for (out, more) in cases {
+        let more: Vec<OsString> = more.iter().map(Into::into).collect();
+        let text = gs4d(&[arguments!["export", &scene, out].to_vec(), more].concat()).text();
+        assert_eq!(text.matches("+z points up").count(), 1, "{}: it is said once: {text}", out.display());
+        let info = gs4d(&arguments!["info", out, "--json"]).json();
+        assert_eq!(info["switches"]["playback"]["up"], "pos_z", "{}: the axis of the capture", out.display());
+    }
 }

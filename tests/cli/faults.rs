@@ -506,3 +506,19 @@ fn two_runs_at_once_leave_one_complete_output() {
         act.run_well("after two runs at once");
     }
 }
+
+#[test]
+fn pipes_in_place_of_captures_are_refused_without_waiting_for_them() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let [pipe, out, scene] = ["pipe.ply", "out.gs4d", "scene.gs4d"].map(|name| folder.path().join(name));
+    let made = Command::new("mkfifo").arg(&pipe).status();
+    assert!(made.is_ok_and(|status| status.success()), "a named pipe can be made");
+    gs4d(&arguments!["info", &pipe]).must_fail("is a pipe or a device");
+    gs4d(&arguments!["convert", &pipe, &out]).must_fail("is a pipe or a device");
+    assert!(!out.exists(), "nothing is written");
+    gs4d(&arguments!["synth", &scene, "--count", "50"]).text();
+    let input = File::open(&scene).expect("the scene is there");
+    let run = Command::new(GS4D).args(["info", "/dev/stdin", "--json"]).stdin(input).output();
+    let found = Run::of(&run.expect("the command starts")).json();
+    assert_eq!(found["gaussians"], 50, "a file as standard input is a file");
+}

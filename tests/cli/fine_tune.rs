@@ -68,7 +68,7 @@ fn training_raises_the_quality_of_a_pruned_scene() {
     let small = lesson.path("small.gs4d");
     let command = arguments!["finetune", &out, "--data", &lesson.data, "-o", &small];
     let coded = ["--steps", "4", "--compress", "balanced", "--compress-steps", "10", "--json"];
-    let terms = ["--mask-weight", "--motion-weight", "--rigid-weight", "--opacity-weight"];
+    let terms = ["--motion-weight", "--rigid-weight", "--opacity-weight"];
     let terms = terms.into_iter().flat_map(|term| [term, "1e-6"]).chain(["--sparse"]).map(Into::into).collect();
     gs4d(&[command.to_vec(), coded.map(Into::into).to_vec(), terms].concat()).json();
     let info = gs4d(&arguments!["info", &small, "--json"]).json();
@@ -214,4 +214,21 @@ fn invalid_inputs_of_training_are_refused_and_leave_no_files() {
     run(&lesson.pruned, &lesson.data).must_fail("c01_02.png");
     assert_eq!(lesson.left(), before, "no file is left");
     assert!(lesson.scene.is_file(), "the scene exists");
+}
+
+#[test]
+fn options_of_gaps_are_for_images_that_have_some() {
+    let Some(lesson) = lesson() else { return };
+    let run = |out: &str| {
+        let command = arguments!["finetune", &lesson.pruned, "--data", &lesson.data, "-o", &lesson.path(out)];
+        let more = ["--steps", "2", "--trust-images", "--mask-weight", "0.1", "--behind", "fixed"];
+        gs4d(&[command.to_vec(), more.map(Into::into).to_vec()].concat())
+    };
+    run("out.gs4d")
+        .must_fail("--mask-weight has no effect on images without transparent pixels and masks; leave it out");
+    let path = lesson.data.join("train/c01_02.png");
+    let mut image = image::open(&path).expect("a picture").into_rgba8();
+    image.get_pixel_mut(3, 4).0[3] = 200;
+    image.save(&path).expect("the folder can be written to");
+    run("out.gs4d").text();
 }

@@ -1,15 +1,21 @@
 //! Commands that take a capture, on files of other makes.
 //!
 //! In: exports of a small synthetic scene, and pictures of one of them. Out: proof that `info`, `convert`, `compress`, `mask`, `bench` and `bake`
-//! take these files as they take packages, and that a file whose Gaussians have windows of time is masked by these alone.
+//! take these files as they take packages, that a file whose Gaussians have windows of time is masked by these alone, that cameras with intrinsics see
+//! an import as it is, and that places on a map keep their digits.
 
 use crate::support::command::{arguments, folder, gs4d, scene};
 use crate::support::dataset;
 use crate::support::no_gpu::no_gpu;
 use bevy_gs4d::codec::{ReadOptions, load};
+use bevy_gs4d::reference;
 use bevy_gs4d::renderer::GpuContext;
-use glam::{UVec2, Vec3};
-use serde_json::Value;
+use bevy_gs4d::scene::{RuntimeScene, SceneForm};
+use bevy_gs4d::view::{Camera, Lens, RasterFov};
+use glam::{Mat4, UVec2, Vec2, Vec3, Vec4};
+use serde_json::{Value, json};
+use std::f32::consts::TAU;
+use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -103,4 +109,86 @@ fn an_import_is_measured() {
         let visible = report["rows"][0]["timings"]["counts"]["visible"].as_f64();
         assert!(visible.is_some_and(|visible| visible > 0.0), "splats are drawn: {report}");
     }
+}
+
+/// Writes a dataset of nerfstudio: pictures of a still scene by ten cameras with focal lengths and a principal point.
+fn pictures(data: &Path, scene: &RuntimeScene) {
+    let (size, center) = (UVec2::new(96, 64), Vec2::new(48.0, 32.0));
+    let lens = Lens::Intrinsics { focal: Vec2::splat(90.0), center };
+    fs::create_dir_all(data.join("images")).expect("the folder can be made");
+    let mut frames = Vec::new();
+    for index in 0..10_u8 {
+        let angle = f32::from(index) * TAU / 10.0;
+        let eye = Vec3::new(3.5 * angle.cos(), 3.5 * angle.sin(), 1.8);
+        let camera = Camera { lens, ..Camera::look_at(eye, Vec3::ZERO, Vec3::Z, 1.0, size) };
+        let name = format!("images/{index:02}.png");
+        let view = camera.view(0.0, RasterFov::Corrected);
+        let picture = reference::render(scene, &view, scene.trained_background()).picture;
+        picture.to_rgb8().save(data.join(&name)).expect("the folder can be written to");
+        let to_world = camera.world_to_camera.inverse() * Mat4::from_diagonal(Vec4::new(1.0, -1.0, -1.0, 1.0));
+        let rows: Vec<[f32; 4]> = (0..4).map(|row| to_world.row(row).to_array()).collect();
+        frames.push(json!({ "file_path": name, "transform_matrix": rows }));
+    }
+    let json = json!({
+        "camera_model": "PINHOLE", "w": size.x, "h": size.y, "fl_x": 90.0, "fl_y": 90.0, "cx": center.x, "cy": center.y,
+        "frames": frames,
+    });
+    fs::write(data.join("transforms.json"), json.to_string()).expect("the folder can be written to");
+}
+
+#[test]
+fn cameras_with_intrinsics_see_an_import_as_it_is() {
+    let folder = folder();
+    let path = exports(&folder, &["a.ply"]).remove(0);
+    let data = folder.path().join("data");
+    let scene = load(&path, &ReadOptions::default()).expect("a PLY").into_runtime().expect("it can be drawn");
+    pictures(&data, &scene);
+    let psnr = |more: &[&str]| {
+        let more: Vec<OsString> = more.iter().map(Into::into).collect();
+        let arguments = arguments!["eval", &path, "--data", &data, "--metrics", "psnr", "--engine", "cpu", "--json"];
+        let report = gs4d(&[arguments.to_vec(), more].concat()).json();
+        report["mean"]["psnr"].as_f64().unwrap_or_else(|| panic!("a number in {report}"))
+    };
+    let found = psnr(&[]);
+    assert!(found > 58.5, "only the rounding to 8 bits differs: {found} dB");
+    let placeholder = psnr(&["--raster-fov", "reference"]);
+    assert!(placeholder < 40.0, "the placeholder of the original trainer is an option: {placeholder} dB");
+}
+
+/// Returns the means of a still capture.
+fn means(path: &Path) -> Vec<[f32; 3]> {
+    match load(path, &ReadOptions::default()).expect("a capture").form {
+        SceneForm::Trained(trained) => trained.parameters.mean,
+        SceneForm::Ready(_) => panic!("a still has the trained form"),
+    }
+}
+
+#[test]
+fn places_on_a_map_keep_their_digits() {
+    let folder = folder();
+    let [path, package, again, other] =
+        ["map.ply", "map.gs4d", "again.ply", "other.splat"].map(|name| folder.path().join(name));
+    let places = [[500_001.05, 5_400_000.5, 310.4], [499_999.25, 5_400_000.7, 309.4], [500_000.45, 5_400_001.1, 309.8]];
+    let names = "f_dc_0 f_dc_1 f_dc_2 opacity scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3";
+    let properties: String = names.split(' ').map(|name| format!("property float {name}\n")).collect();
+    let rows: String =
+        places.iter().map(|[x, y, z]: &[f64; 3]| format!("{x} {y} {z} 1 0 0 4 -2.5 -2.5 -2.5 1 0 0 0\n")).collect();
+    let header = "ply\nformat ascii 1.0\nelement vertex 3\nproperty double x\nproperty double y\nproperty double z\n";
+    fs::write(&path, format!("{header}{properties}end_header\n{rows}")).expect("the folder can be written to");
+
+    let shown = gs4d(&arguments!["info", &path]);
+    assert!(shown.err.contains("single precision has steps of 0.5 units"), "why is said: {}", shown.err);
+    assert!(shown.text().contains("(500000, 5400001, 310)"), "the origin is shown");
+    gs4d(&arguments!["convert", &path, &package]).text();
+    let origin = info(&package)["switches"]["trained_with"]["origin"]["place"].clone();
+    assert_eq!(origin, json!([500_000.0, 5_400_001.0, 310.0]), "a package keeps it");
+    let text = gs4d(&arguments!["export", &package, &again]).text();
+    assert!(!text.contains("left out"), "nothing is lost: {text}");
+    assert_eq!(means(&again), means(&path), "an export has the places of the file");
+    let written = fs::read(&again).expect("the file is there");
+    let place = written.windows(11).position(|window| window == b"end_header\n").expect("a header") + 11;
+    let x = written[place..].first_chunk().map(|bytes| f64::from_le_bytes(*bytes)).expect("a number");
+    assert!((x - 500_001.05).abs() < 1e-6, "in double precision: {x}");
+    let text = gs4d(&arguments!["export", &package, &other]).text();
+    assert!(text.contains("(500000, 5400001, 310)") && text.contains("left out"), "no origin in .splat: {text}");
 }

@@ -3,6 +3,7 @@
 //! In: command lines, scenes and datasets made here, and the trained captures if `GS4D_DATA` names their folder.
 //! Out: one test binary. The header of each module names the verbs that it tests.
 
+mod advice;
 mod bake;
 mod command;
 mod compare;
@@ -24,6 +25,7 @@ mod outputs;
 #[cfg(target_os = "linux")]
 mod plan;
 mod prune;
+mod remedies;
 mod render;
 #[cfg(target_os = "linux")]
 mod shards;
@@ -47,6 +49,7 @@ mod support {
     pub mod npy;
     pub mod npz;
     pub mod package_parts;
+    pub mod pth;
     #[cfg(target_os = "linux")]
     pub mod random;
     pub mod skip;

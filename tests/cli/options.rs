@@ -1,17 +1,27 @@
-//! Options without an effect, in every verb that takes options which depend on others.
+//! Options without an effect, of every verb.
 //!
-//! In: a table of command lines, whose files need not exist, and the sentence that refuses each. Out: proof that an option that would be ignored
-//! is an error that names it, before any file is read; and that the same sentence refuses packed captures in `compress` and `bake`.
+//! In: a table of command lines, whose files need not exist, command lines on captures and datasets made here, and the sentence that refuses each.
+//! Out: proof that an option that would be ignored is an error that names it, before any file is read if the command line tells it, and before
+//! anything is computed otherwise; that every option of every verb that `--help` lists is refused somewhere or always has an effect; and that the
+//! same sentence refuses packed captures in `compress` and `bake`.
 //!
-//! Options that describe the checkpoint (`--time-interval`, `--up` and the others of that group) are facts about a file, not requests: those that
+//! Options that describe the checkpoint (`--time-interval`, `--rotation-convention` and others of that group) are facts about a file, too: those that
 //! contradict a package are refused by the tests of `command`.
 
 use crate::support::capture::Capture;
-use crate::support::command::{arguments, folder, gs4d, scene};
+use crate::support::command::{arguments, folder, gs4d, scene, words};
+use crate::support::dataset;
+use crate::support::folders::contents;
+use bevy_gs4d::codec::package::WriteSettings;
+use bevy_gs4d::offline;
+use bevy_gs4d::scene::Environment;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use glam::{UVec2, Vec3};
 use serde_json::{Value, json};
+use std::collections::BTreeSet;
 use std::fs;
+use std::thread;
+use tempfile::TempDir;
 
 /// Command lines, words separated by spaces, and the beginning of the sentence after `error: `.
 const REFUSED: &[(&str, &str)] = &[
@@ -59,6 +69,20 @@ const REFUSED: &[(&str, &str)] = &[
     ("score a --data d --out o --engine cpu --adapter x", "--adapter has no effect with --engine cpu"),
     ("score a --data d --out o --engine cpu --checks", "--checks has no effect with --engine cpu"),
     ("score a --out o --size 8x8", "the following required arguments were not provided"),
+    ("score a --out o --static", "the following required arguments were not provided"),
+    ("score a --out o --resolution 2", "the following required arguments were not provided"),
+    ("score a --data d --out o --variant energy --duration 3", "--duration has no effect on what is made here"),
+    ("score a --data d --out o --variant energy --up +y", "--up has no effect on views that are given"),
+    ("score a --data d --out o --shard 0/2 --ratio 0.3", "--ratio has no effect with --shard: give it with --merge"),
+    ("score --merge p --out o --variant all --data d", "--data has no effect on parts alone"),
+    ("score --merge p --out o --variant all --views 3", "--views has no effect on parts alone"),
+    ("score --merge p --out o --variant all --engine gpu", "--engine has no effect on parts alone"),
+    ("score --merge p --out o --variant all --time-interval 0,2", "--time-interval has no effect on parts alone"),
+    ("score --merge p --out o --variant all --background 1,1,1", "--background has no effect on parts alone"),
+    ("score --merge p --out o --variant all --raster-fov corrected", "--raster-fov has no effect on parts alone"),
+    ("score --merge p --out o --variant all --trained-cameras fov", "--trained-cameras has no effect on parts alone"),
+    ("score --merge p --out o --variant all --sh-direction displaced", "--sh-direction has no effect on parts alone"),
+    ("score --merge p --out o --variant all --cutoff 0.1", "--cutoff has no effect on parts alone"),
     // prune
     ("prune a -o o --keep 3 --scores s --variant energy", "the argument '--scores <FILE>' cannot be used with"),
     ("prune a -o o --keep 3 --scores s --views 3", "the argument '--scores <FILE>' cannot be used with"),
@@ -80,10 +104,21 @@ const REFUSED: &[(&str, &str)] = &[
     ),
     ("prune a -o o --keep 3 --data d --variant energy --volume-power 1", "--volume-power has no effect on scores that"),
     ("prune a -o o --keep 3 --data d --engine cpu --checks", "--checks has no effect with --engine cpu"),
+    ("prune a -o o --keep 3 --scores s --static", "the following required arguments were not provided"),
+    ("prune a -o o --keep 3 --scores s --size 8x8", "the following required arguments were not provided"),
+    ("prune a -o o --keep 3 --scores s --resolution 2", "the following required arguments were not provided"),
+    ("prune a -o o --keep 3 --data d --engine cpu --adapter x", "--adapter has no effect with --engine cpu"),
     // mask
     ("mask a -o o --data d", "--data has no effect with --filter support unless --every is given"),
     ("mask a -o o --data d --size 8x8", "--size has no effect with --filter support"),
     ("mask a -o o --data d --every 2 --resolution 2", "--resolution has no effect with --filter support"),
+    ("mask a -o o --static", "the following required arguments were not provided"),
+    (
+        "mask a -o o --filter interval --data d --shard 0/2 --level 3",
+        "--level has no effect with --shard: give it with --merge",
+    ),
+    ("mask a -o o --shard 0/2", "--shard has no effect with --filter support"),
+    ("mask a -o o --merge p", "--merge has no effect with --filter support"),
     ("mask a -o o --engine gpu", "--engine has no effect with --filter support"),
     ("mask a -o o --adapter x", "--adapter has no effect with --filter support"),
     ("mask a -o o --checks", "--checks has no effect with --filter support"),
@@ -94,18 +129,38 @@ const REFUSED: &[(&str, &str)] = &[
     ("eval a --data d --engine cpu --renderer bins", "--renderer has no effect with --engine cpu"),
     ("eval a --data d --engine cpu --adapter x", "--adapter has no effect with --engine cpu"),
     ("eval a --data d --engine cpu --checks", "--checks has no effect with --engine cpu"),
+    ("eval a --data d --merge p --out o", "--out has no effect with --merge, which draws no pictures"),
+    ("eval a --data d --duration 3", "--duration has no effect on what is made here, which is not played"),
+    ("eval a --data d --up +y", "--up has no effect on views that are given"),
     // ablate
-    ("ablate a --data d --split test --validation times", "--validation has no effect with --split test"),
+    ("ablate a --data d --split test --validation times", "--validation has no effect with a --split of the dataset"),
+    ("ablate a --data d --duration 3", "--duration has no effect on what is made here, which is not played"),
+    ("ablate a --data d --up +y", "--up has no effect on views that are given"),
+    ("ablate a --data d --engine cpu --adapter x", "--adapter has no effect with --engine cpu"),
+    ("ablate a --data d --variants energy --volume-rank 1", "--volume-rank has no effect on scores that do not use"),
     (
         "ablate a --data d --variants energy,peak --volume-power 1",
         "--volume-power has no effect on scores that do not use",
     ),
     ("ablate a --data d --engine cpu --checks", "--checks has no effect with --engine cpu"),
     // train
-    ("train -o o --data d --validation none --patience 3", "--patience has no effect with --validation none"),
+    ("train -o o --data d --validation none --patience 3", "--patience has no effect without validation views"),
+    ("train -o o --data d --densify original --noise 1", "--noise has no effect with --densify original"),
+    ("train -o o --data d --densify original --dropout 0.2", "--dropout has no effect with --densify original"),
+    (
+        "train -o o --data d --densify original --relocate-every 9",
+        "--relocate-every has no effect with --densify original",
+    ),
+    ("train -o o --data d --densify original --rigid-weight 1", "--rigid-weight has no effect with --densify original"),
+    ("train -o o --data d --start random --points p.ply", "--points has no effect with --start hull or random"),
+    ("train -o o --data d --steps 999 --trust-images", "--trust-images has no effect with fewer than 1000 steps"),
+    (
+        "train -o o --data d --sh-degree 0 --raise-degree-every 9",
+        "--raise-degree-every has no effect with --sh-degree 0",
+    ),
     ("train -o o --data d --sh-degree 2 --sh-degree-t 1", "--sh-degree-t has no effect with --sh-degree below 3"),
     // finetune
-    ("finetune a -o o --data d --validation none --patience 3", "--patience has no effect with --validation none"),
+    ("finetune a -o o --data d --validation none --patience 3", "--patience has no effect without validation views"),
     ("finetune a -o o --data d --compress-steps 3", "the following required arguments were not provided"),
     ("finetune a -o o --data d --round-geometry", "the following required arguments were not provided"),
     (
@@ -133,10 +188,28 @@ const REFUSED: &[(&str, &str)] = &[
     ("bake a -o o --data d --engine cpu --batch 3", "--batch has no effect with --engine cpu"),
     ("bake a -o o --data d --engine cpu --rounds 3", "--rounds has no effect with --engine cpu"),
     ("bake a -o o --data d --engine cpu --sums atomic", "--sums has no effect with --engine cpu"),
+    ("bake a -o o --data d --engine cpu --exposure", "--exposure has no effect with --engine cpu"),
+    ("bake a -o o --data d --engine cpu --checks", "--checks has no effect with --engine cpu"),
+    ("bake a -o o --data d --volume-rank 1", "--volume-rank has no effect on scores that do not use"),
+    ("bake a -o o --data d --gaussians 9", "--gaussians has no effect with a checkpoint"),
+    ("bake a -o o --data d --train-steps 9", "--train-steps has no effect with a checkpoint"),
+    ("bake a -o o --data d --environment 9", "--environment has no effect with a checkpoint"),
     ("bake a -o o --data d --engine cpu --adapter x", "--adapter has no effect with --engine cpu"),
     ("bake a -o o --data d --volume-power 1", "--volume-power has no effect on scores that do not use"),
     ("bake a -o o --data d --key-frames 3 --every 3", "the argument '--key-frames <K>' cannot be used with"),
     // the others
+    ("info a --cameras c.png", "--cameras has no effect on a capture: it is for the folder of a dataset"),
+    ("info a --static", "--static has no effect on a capture: it is for the folder of a dataset"),
+    ("export a o.ply --background 1,1,1", "--background has no effect on what is made here, which has no background"),
+    ("export a o.ply --time 0 --duration 3", "--duration has no effect on what is made here, which is not played"),
+    ("export a o.ftgs.ply --time 0", "--time has no effect on a format with motion"),
+    ("export a o --sequence --format free-time", "--sequence has no effect on a format with motion"),
+    ("bench a --background 1,1,1", "--background has no effect on what is made here, which has no background"),
+    ("bench a --duration 3", "--duration has no effect on what is made here, which is not played"),
+    ("bench a --cameras c.json --up +y", "--up has no effect on views that are given"),
+    ("render a --out o --orbit 3 --duration 3", "--duration has no effect on what is made here, which is not played"),
+    ("render a --out o --cameras c.json --up +y", "--up has no effect on views that are given"),
+    ("render a --out o --orbit 3 --level 1 --antialias", "--antialias has no effect with --level"),
     ("bench a --orbit 3 --views 3", "the argument '--orbit <N>' cannot be used with '--views <N>'"),
     ("bench a --resolution 2", "the following required arguments were not provided"),
     ("bench a --times 3 --time 0.5", "the argument '--times <K>' cannot be used with '--time <T>'"),
@@ -148,6 +221,8 @@ const REFUSED: &[(&str, &str)] = &[
     ("render a --out o --cameras c.json --size 8x8 --resolution 2", "the argument '--size <WxH>' cannot be used with"),
     ("detail a -o o --size 8x8", "the following required arguments were not provided"),
     ("detail a -o o --resolution 2", "the following required arguments were not provided"),
+    ("detail a -o o --static", "the following required arguments were not provided"),
+    ("detail a -o o --trust-images", "the following required arguments were not provided"),
     ("synth o --sh-degree 2 --sh-degree-t 1", "--sh-degree-t has no effect with --sh-degree below 3"),
     ("convert a o --sh-degree 2 --sh-degree-t 1", "--sh-degree-t has no effect with --sh-degree below 3"),
     ("synth o --grow 2 a --count 3", "the argument '--grow <K> <CAPTURE>' cannot be used with '--count <N>'"),
@@ -186,14 +261,550 @@ fn sizes_of_pictures_without_an_effect_are_refused() {
     gs4d(&fixed).text();
 }
 
-#[test]
-fn the_refreshing_of_a_filter_needs_one_that_is_refreshed() {
-    let folder = folder();
-    let (scene, out) = (scene(&folder, "50"), folder.path().join("out.gs4d"));
-    let data = folder.path().join("data");
-    gs4d(&arguments!["finetune", &scene, "--data", &data, "-o", &out, "--refresh-filter", "3"]).must_fail(
+/// The verbs that read captures, and their arguments after the capture. Words in capitals are files: see [`words`].
+const READERS: &[(&str, &str)] = &[
+    ("info", ""),
+    ("convert", "-o OUT.gs4d"),
+    ("export", "OUT.ply --time 0"),
+    ("render", "--out OUT --orbit 1 --adapter none-such"),
+    ("compress", "-o OUT.gs4d"),
+    ("detail", "-o OUT.gs4d"),
+    ("bench", ""),
+    ("score", "--data DATA --out OUT.f32 --variant energy"),
+    ("prune", "--data DATA --keep 3 -o OUT.gs4d"),
+    ("mask", "-o OUT.gs4d"),
+    ("eval", "--data DATA --engine cpu"),
+    ("ablate", "--data DATA --engine cpu"),
+    ("finetune", "--data DATA -o OUT.gs4d"),
+    ("bake", "--data DATA -o OUT.gs4d --engine cpu"),
+];
+
+/// Options of reading that some captures do not take, in every verb: a capture, the option, and the beginning of the sentence.
+const OF_FORMATS: &[(&str, &str, &str)] = &[
+    ("SCENE.gs4d", "--fps 5", "--fps has no effect on this capture"),
+    ("SCENE.gs4d", "--tolerance 0.5", "--tolerance has no effect on this capture"),
+    ("STILL.ply", "--fps 5", "--fps has no effect on this capture"),
+    ("STILL.ply", "--rotation-convention unflipped", "--rotation-convention has no effect on this capture"),
+    ("STILL.ply", "--force-sh-3d", "--force-sh-3d has no effect on a file of another make"),
+    ("STILL.ply", "--prefilter-var 0.5", "--prefilter-var has no effect on a file of another make"),
+];
+
+/// Options of captures, with values.
+const OF_CAPTURES: &[&str] = &[
+    "--rotation-convention unflipped",
+    "--raster-fov corrected",
+    "--trained-cameras fov",
+    "--sh-direction displaced",
+    "--force-sh-3d",
+    "--prefilter-var 0.5",
+    "--up +y",
+    "--cutoff 0.1",
+    "--fps 5",
+    "--tolerance 0.5",
+];
+
+/// Command lines on files, and the beginning of the sentence after `error: `.
+const REFUSED_ON_FILES: &[(&str, &str)] = &[
+    ("info DATA --time-interval 0,2", "--time-interval has no effect on a dataset: it is for captures"),
+    ("info DATA --background 1,1,1", "--background has no effect on a dataset: it is for captures"),
+    ("info DATA --duration 3", "--duration has no effect on a dataset: it is for captures"),
+    ("convert FRAMES -o OUT.gs4d --tolerance 0.5", "--tolerance has no effect on this capture"),
+    ("convert MOVING.ftgs.ply -o OUT.gs4d --tolerance 0.5", "--tolerance has no effect on this capture"),
+    ("convert MOVING.ftgs.ply -o OUT.gs4d --fps 5 --duration 2", "--fps has no effect with --duration"),
+    (
+        "eval SCENE.gs4d --data DATA --engine cpu --no-filter",
+        "--no-filter has no effect on a capture without a temporal filter",
+    ),
+    ("bench SCENE.gs4d --filter off", "--filter has no effect on a capture without a temporal filter"),
+    ("bench SCENE.gs4d --form fp32", "--form has no effect on a capture that is not packed"),
+    ("compare A.png B.png --size 8x8", "--size has no effect without .f32 pictures"),
+    (
+        "finetune SCENE.gs4d --data DATA -o OUT.gs4d --refresh-filter 3",
         "--refresh-filter has no effect on a scene without a temporal filter of the kind key-frame or interval",
-    );
+    ),
+    (
+        "finetune SCENE.gs4d --data DATA -o OUT.gs4d --mask-weight 0.1",
+        "--mask-weight has no effect on images without transparent pixels and masks",
+    ),
+    (
+        "finetune SCENE.gs4d --data DATA -o OUT.gs4d --behind fixed",
+        "--behind has no effect on images without transparent pixels and masks",
+    ),
+    (
+        "finetune SURROUNDED.gs4d --data DATA -o OUT.gs4d --behind fixed",
+        "--behind has no effect on a capture with an environment map",
+    ),
+    (
+        "finetune STILL.ply --data DATA -o OUT.gs4d --motion-weight 0.1",
+        "--motion-weight has no effect on a capture at rest",
+    ),
+    (
+        "finetune STILL.ply --data DATA -o OUT.gs4d --rigid-weight 0.1",
+        "--rigid-weight has no effect on a capture at rest",
+    ),
+    ("finetune SCENE.gs4d --data FEW -o OUT.gs4d --patience 3", "--patience has no effect without validation views"),
+    ("train --data FEW -o OUT.gs4d --patience 3", "--patience has no effect without validation views"),
+    (
+        "train --data DATA -o OUT.gs4d --mask-weight 0.1",
+        "--mask-weight has no effect on images without transparent pixels and masks",
+    ),
+    (
+        "train --data DATA -o OUT.gs4d --behind fixed",
+        "--behind has no effect on images without transparent pixels and masks",
+    ),
+    (
+        "bake SCENE.gs4d --data BARE -o OUT.gs4d --keep 9 --steps 3",
+        "--steps has no effect where no Gaussians are trained",
+    ),
+    (
+        "bake SCENE.gs4d --data BARE -o OUT.gs4d --keep 9 --rounds 3",
+        "--rounds has no effect where no Gaussians are trained",
+    ),
+    ("bake SCENE.gs4d --data DATA -o OUT.gs4d --engine cpu --shards 2", "--shards has no effect without --plan"),
+    (
+        "bake SCENE.gs4d --data DATA -o OUT.gs4d --engine cpu --only mask --shard 0/2",
+        "--shard has no effect on this stage",
+    ),
+];
+
+/// Command lines on files whose options have an effect.
+const ACCEPTED: &[&str] = &[
+    "convert FRAMES -o OUT.gs4d --fps 4",
+    "convert MOVING.ftgs.ply -o OUT.gs4d --fps 5",
+    "convert SCENE.gs4d -o OUT.gs4d --rotation-convention flipped --prefilter-var -1 --up -y --duration 3 --background 1,1,1",
+    "export SCENE.gs4d OUT --sequence --fps 2 --duration 1",
+    "export SCENE.gs4d OUT.ftgs.ply --fps 2",
+    "info STILL.ply --up -y --duration 2 --cutoff 0.1",
+    "eval FILTERED.gs4d --data DATA --engine cpu --no-filter --metrics psnr --views 1",
+];
+
+/// The options of each verb that always have an effect, or are refused by their values alone.
+const ALWAYS: &[(&str, &[&str])] = &[
+    ("info", &[]),
+    (
+        "convert",
+        &[
+            "--background",
+            "--cutoff",
+            "--duration",
+            "--form",
+            "--level",
+            "--merge",
+            "--out",
+            "--raster-fov",
+            "--sh-degree",
+            "--sh-direction",
+            "--time-interval",
+            "--trained-cameras",
+            "--up",
+        ],
+    ),
+    (
+        "export",
+        &["--cutoff", "--format", "--raster-fov", "--sh-direction", "--time-interval", "--trained-cameras", "--up"],
+    ),
+    (
+        "render",
+        &[
+            "--adapter",
+            "--background",
+            "--checks",
+            "--cutoff",
+            "--level",
+            "--orbit",
+            "--out",
+            "--raster-fov",
+            "--raw",
+            "--renderer",
+            "--sh-direction",
+            "--size",
+            "--time",
+            "--time-interval",
+            "--trained-cameras",
+        ],
+    ),
+    (
+        "compress",
+        &[
+            "--background",
+            "--cutoff",
+            "--duration",
+            "--level",
+            "--merge",
+            "--out",
+            "--quality",
+            "--raster-fov",
+            "--sh-direction",
+            "--time-interval",
+            "--trained-cameras",
+            "--up",
+            "--verify",
+        ],
+    ),
+    (
+        "detail",
+        &[
+            "--adapter",
+            "--background",
+            "--checks",
+            "--cutoff",
+            "--data",
+            "--directions",
+            "--duration",
+            "--level",
+            "--levels",
+            "--min-psnr",
+            "--out",
+            "--raster-fov",
+            "--renderer",
+            "--sh-direction",
+            "--steps",
+            "--time-interval",
+            "--times",
+            "--trained-cameras",
+            "--up",
+        ],
+    ),
+    ("compare", &[]),
+    ("synth", &["--grow", "--level", "--out", "--seed", "--sh-degree"]),
+    (
+        "bench",
+        &[
+            "--adapter",
+            "--cameras",
+            "--checks",
+            "--cutoff",
+            "--depths",
+            "--frames",
+            "--half",
+            "--orbit",
+            "--raster-fov",
+            "--renderer",
+            "--rounds",
+            "--sh-direction",
+            "--size",
+            "--time-interval",
+            "--times",
+            "--trained-cameras",
+        ],
+    ),
+    ("score", &["--merge", "--out", "--shard", "--variant"]),
+    (
+        "prune",
+        &[
+            "--background",
+            "--cutoff",
+            "--duration",
+            "--keep",
+            "--level",
+            "--max-loss",
+            "--out",
+            "--raster-fov",
+            "--ratio",
+            "--scores",
+            "--sh-direction",
+            "--time-interval",
+            "--trained-cameras",
+            "--up",
+        ],
+    ),
+    (
+        "mask",
+        &[
+            "--background",
+            "--cutoff",
+            "--duration",
+            "--filter",
+            "--key-frames",
+            "--out",
+            "--raster-fov",
+            "--sh-direction",
+            "--time-interval",
+            "--trained-cameras",
+            "--up",
+        ],
+    ),
+    (
+        "eval",
+        &[
+            "--background",
+            "--cutoff",
+            "--data",
+            "--engine",
+            "--merge",
+            "--metrics",
+            "--raster-fov",
+            "--resolution",
+            "--sh-direction",
+            "--shard",
+            "--split",
+            "--static",
+            "--time-interval",
+            "--trained-cameras",
+            "--views",
+        ],
+    ),
+    (
+        "ablate",
+        &[
+            "--background",
+            "--csv",
+            "--cutoff",
+            "--data",
+            "--engine",
+            "--filters",
+            "--key-frames",
+            "--measured-views",
+            "--raster-fov",
+            "--ratios",
+            "--resolution",
+            "--sh-direction",
+            "--split",
+            "--static",
+            "--time-interval",
+            "--trained-cameras",
+            "--trust-images",
+            "--variants",
+            "--views",
+        ],
+    ),
+    (
+        "train",
+        &[
+            "--adapter",
+            "--background",
+            "--batch",
+            "--checks",
+            "--data",
+            "--densify",
+            "--duration",
+            "--environment",
+            "--evaluate-every",
+            "--exposure",
+            "--gaussians",
+            "--last-mean-rate",
+            "--last-rate",
+            "--least-time-scale",
+            "--level",
+            "--mean-rate",
+            "--motion-weight",
+            "--opacity-weight",
+            "--out",
+            "--renderer",
+            "--resolution",
+            "--save-every",
+            "--scale-weight",
+            "--seed",
+            "--sh-degree",
+            "--similarity",
+            "--sparse",
+            "--start",
+            "--static",
+            "--steps",
+            "--sums",
+            "--time-interval",
+            "--time-scale",
+            "--validation",
+        ],
+    ),
+    (
+        "finetune",
+        &[
+            "--adapter",
+            "--background",
+            "--batch",
+            "--checks",
+            "--compress",
+            "--cutoff",
+            "--data",
+            "--duration",
+            "--evaluate-every",
+            "--exposure",
+            "--gradients",
+            "--last-rate",
+            "--level",
+            "--mean-rate",
+            "--opacity-weight",
+            "--out",
+            "--raster-fov",
+            "--rates",
+            "--renderer",
+            "--resolution",
+            "--save-every",
+            "--seed",
+            "--sh-direction",
+            "--similarity",
+            "--sparse",
+            "--static",
+            "--steps",
+            "--sums",
+            "--time-interval",
+            "--trained-cameras",
+            "--trust-images",
+            "--up",
+            "--validation",
+        ],
+    ),
+    (
+        "bake",
+        &[
+            "--background",
+            "--data",
+            "--duration",
+            "--engine",
+            "--filter",
+            "--keep",
+            "--keep-work",
+            "--key-frames",
+            "--level",
+            "--max-loss",
+            "--no-fine-tune",
+            "--only",
+            "--out",
+            "--plan",
+            "--quality",
+            "--ratio",
+            "--resolution",
+            "--static",
+            "--target-size",
+            "--time-interval",
+            "--trust-images",
+            "--validation",
+            "--variant",
+            "--views",
+        ],
+    ),
+    ("report", &["--csv", "--out"]),
+];
+
+/// Returns every command line that is refused on files, and the beginning of the sentence.
+fn refused_on_files() -> Vec<(String, String)> {
+    let of_formats = READERS.iter().flat_map(|(verb, more)| {
+        let case = move |(capture, option, sentence): &(&str, &str, &str)| {
+            (format!("{verb} {capture} {more} {option}"), (*sentence).to_owned())
+        };
+        OF_FORMATS.iter().map(case)
+    });
+    let of_datasets = OF_CAPTURES.iter().flat_map(|option| {
+        let name = option.split(' ').next().unwrap_or_default();
+        [
+            (format!("info DATA {option}"), format!("{name} has no effect on a dataset: it is for captures")),
+            (
+                format!("bake DATA -o OUT.gs4d --keep 5 {option}"),
+                format!("{name} has no effect with a dataset: it is for checkpoints"),
+            ),
+        ]
+    });
+    let others = REFUSED_ON_FILES.iter().map(|(command, sentence)| ((*command).to_owned(), (*sentence).to_owned()));
+    of_formats.chain(of_datasets).chain(others).collect()
+}
+
+/// Makes the files that the command lines name.
+fn files() -> TempDir {
+    let folder = folder();
+    let path = |name: &str| folder.path().join(name);
+    let scene = scene(&folder, "60");
+    gs4d(&arguments!["export", &scene, path("still.ply"), "--time", "0.5"]).text();
+    gs4d(&arguments!["export", &scene, path("moving.ftgs.ply")]).text();
+    gs4d(&arguments!["export", &scene, path("frames"), "--sequence", "--fps", "2"]).text();
+    gs4d(&arguments!["mask", &scene, "-o", path("filtered.gs4d")]).text();
+    let mut trained = synthesize(&SynthSettings { count: 60, ..SynthSettings::default() });
+    let runtime = trained.clone().into_runtime().expect("a synthetic scene can be drawn");
+    for (name, cameras, times, images) in [("data", 4, 4, true), ("few", 3, 2, true), ("bare", 4, 4, false)] {
+        dataset::write(&path(name), &runtime, Vec3::ZERO, cameras, times, UVec2::splat(16), images);
+    }
+    trained.environment = Some(Environment { width: 4, height: 2, texels: vec![0.5; 24] });
+    let settings = WriteSettings::default();
+    offline::save(&path("surrounded.gs4d"), &trained, &settings).expect("the folder can be written to");
+    for picture in ["a.png", "b.png"] {
+        image::RgbImage::new(8, 8).save(path(picture)).expect("the folder can be written to");
+    }
+    folder
+}
+
+/// Calls a function with each item and its number, on four threads.
+fn on_threads<T: Sync>(items: &[T], run: impl Fn(usize, &T) + Sync) {
+    let run = &run;
+    thread::scope(|scope| {
+        for first in 0..4 {
+            scope.spawn(move || {
+                items.iter().enumerate().skip(first).step_by(4).for_each(|(number, item)| run(number, item));
+            });
+        }
+    });
+}
+
+#[test]
+fn options_without_an_effect_on_their_files_are_refused() {
+    let folder = files();
+    let before = contents(folder.path());
+    on_threads(&refused_on_files(), |number, (command, sentence)| {
+        let run = gs4d(&words(command, folder.path(), number));
+        run.must_fail(sentence);
+        assert!(run.err.contains(&format!("error: {sentence}")), "{command}: the sentence: {}", run.err);
+        assert!(run.err.contains("; leave it out"), "{command}: the remedy: {}", run.err);
+    });
+    assert!(contents(folder.path()) == before, "nothing is written");
+}
+
+#[test]
+fn options_with_an_effect_on_their_files_are_accepted() {
+    let folder = files();
+    on_threads(ACCEPTED, |number, command| {
+        let run = gs4d(&words(command, folder.path(), number));
+        assert_eq!(run.code, Some(0), "{command}: {}", run.err);
+    });
+}
+
+/// Returns the options of a verb that its help lists.
+fn options_of(verb: &str) -> BTreeSet<String> {
+    let help = gs4d(&[verb, "--help"]).text();
+    let name = |line: &str| {
+        let long = line.strip_prefix("      --").or(line.strip_prefix("  -").and_then(|line| line.get(5..)))?;
+        let name: String = long.chars().take_while(|c| c.is_ascii_alphanumeric() || *c == '-').collect();
+        Some(format!("--{name}"))
+    };
+    help.lines().filter_map(name).filter(|name| !["--json", "--help", "--version"].contains(&name.as_str())).collect()
+}
+
+/// Returns the verbs that the help of the command lists.
+fn verbs() -> BTreeSet<String> {
+    let help = gs4d(&["--help"]).text();
+    let (_, list) = help.split_once("Commands:\n").expect("a list of verbs");
+    let list = list.split("\n\n").next().expect("the list ends");
+    let first = |line: &str| Some(line.strip_prefix("  ")?.split(' ').next()?.to_owned());
+    // Other lines go on after more spaces.
+    list.lines().filter_map(first).filter(|word| !word.is_empty() && word != "help").collect()
+}
+
+/// Returns the verb and the option that a refused command line is about: that of the sentence, or else the last one of the command.
+fn about(command: &str, sentence: &str) -> (String, String) {
+    let mut words = command.split(' ');
+    let verb = words.next().unwrap_or_default();
+    let last = words.rfind(|word| word.starts_with("--")).unwrap_or_default();
+    let option = if sentence.starts_with("--") { sentence.split(' ').next().unwrap_or_default() } else { last };
+    (verb.to_owned(), option.to_owned())
+}
+
+#[test]
+fn every_option_of_every_verb_always_has_an_effect_or_is_refused_somewhere() {
+    let on_files = refused_on_files();
+    let all = on_files.iter().map(|(command, sentence)| (command.as_str(), sentence.as_str()));
+    let refused: BTreeSet<_> =
+        all.chain(REFUSED.iter().copied()).map(|(command, sentence)| about(command, sentence)).collect();
+    let listed: BTreeSet<String> = ALWAYS.iter().map(|(verb, _)| (*verb).to_owned()).collect();
+    assert_eq!(listed, verbs(), "every verb");
+    for (verb, always) in ALWAYS {
+        let known = options_of(verb);
+        let conditional: BTreeSet<_> =
+            refused.iter().filter(|(of, _)| of == verb).map(|(_, option)| option.clone()).collect();
+        let unknown: Vec<_> = conditional.difference(&known).collect();
+        assert!(unknown.is_empty(), "{verb}: {unknown:?} are refused and not in the help");
+        let rest: Vec<_> = known.difference(&conditional).map(String::as_str).collect();
+        let mut always = always.to_vec();
+        always.sort_unstable();
+        assert_eq!(rest, always, "{verb}: the options that are refused nowhere are those that always have an effect");
+    }
 }
 
 #[test]

@@ -171,6 +171,27 @@ fn errors_of_links_and_devices_name_the_file_in_a_sentence() {
     }
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn standard_error_is_empty_where_there_is_no_session() {
+    use crate::support::command::{GS4D, Run};
+    use crate::support::no_gpu::no_gpu;
+    use bevy_gs4d::renderer::GpuContext;
+    use std::process::Command;
+    if GpuContext::headless(None).is_err() {
+        return no_gpu();
+    }
+    let folder = folder();
+    let scene = scene(&folder, "50");
+    let command =
+        arguments!["render", &scene, "--orbit", "1", "--size", "16x16", "--out", folder.path().join("frames")];
+    let mut child = Command::new(GS4D);
+    child.args(&command).env_remove("XDG_RUNTIME_DIR").env_remove("WAYLAND_DISPLAY");
+    let run = Run::of(&child.output().expect("the command starts"));
+    assert_eq!((run.code, run.err.as_str()), (Some(0), ""), "neither the driver nor libwayland prints a line");
+    assert!(folder.path().join("frames/orbit_0000.png").is_file(), "a picture is drawn");
+}
+
 #[test]
 fn absurd_weights_are_refused_in_a_few_words() {
     let folder = folder();

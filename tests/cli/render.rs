@@ -10,12 +10,15 @@ use crate::support::folders::contents;
 use crate::support::no_gpu::no_gpu;
 use crate::support::npz;
 use crate::support::skip::skip;
+use bevy_gs4d::codec::package::WriteSettings;
 use bevy_gs4d::offline::metrics::SquaredError;
+use bevy_gs4d::offline::save;
 use bevy_gs4d::renderer::GpuContext;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use bevy_gs4d::scene::{SceneForm, Trained};
 use bevy_gs4d::view::Picture;
 use glam::{UVec2, Vec3};
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -83,6 +86,33 @@ fn images_of_a_camera_file_are_written_only_if_none_of_them_exists() {
 }
 
 #[test]
+fn pictures_of_what_is_nearer_than_the_near_limit_are_pointed_out() {
+    if !has_gpu() {
+        return;
+    }
+    let folder = folder();
+    let [path, cameras, frames] = ["scene.gs4d", "near.json", "frames"].map(|name| folder.path().join(name));
+    let mut scene = synthesize(&SynthSettings { count: 200, ..SynthSettings::default() });
+    let SceneForm::Trained(Trained { parameters, .. }) = &mut scene.form else { panic!("the trained form") };
+    parameters.mean.as_flattened_mut().iter_mut().for_each(|value| *value *= 0.01);
+    parameters.log_scale.as_flattened_mut().iter_mut().for_each(|value| *value += 0.01f32.ln());
+    let frame = |name: &str, x: f32| {
+        let matrix = [[1.0, 0.0, 0.0, x], [0.0, 0.0, -1.0, -0.05], [0.0, 1.0, 0.0, 0.005], [0.0, 0.0, 0.0, 1.0]];
+        json!({ "file_path": name, "time": 0.5, "transform_matrix": matrix })
+    };
+    let views = json!({ "camera_angle_x": 0.7, "w": 32, "h": 32, "frames": [frame("a", 0.0), frame("b", 0.001)] });
+    fs::write(&cameras, views.to_string()).expect("the folder can be written to");
+    for (near, note) in [(0.2, true), (0.001, false)] {
+        scene.trained_with.near = near;
+        save(&path, &scene, &WriteSettings::default()).expect("the folder can be written to");
+        let run = gs4d(&arguments!["render", &path, "--cameras", &cameras, "--out", &frames]);
+        assert_eq!(run.code, Some(0), "the pictures are drawn: {}", run.err);
+        let said = run.err.contains("2 of 2 pictures show nothing") && run.err.contains("0.2 units");
+        assert_eq!(said, note, "with a near limit of {near}: {}", run.err);
+    }
+}
+
+#[test]
 fn pictures_that_do_not_fit_are_refused_before_they_are_drawn() {
     let limit = match GpuContext::headless(None) {
         Ok(context) => context.device.limits().max_buffer_size,
@@ -110,12 +140,12 @@ fn bench_reports_times_and_counts() {
     }
     let folder = folder();
     let path = scene(&folder, "1000");
-    let bench = |more: &[&str]| {
+    let bench = |path: &Path, more: &[&str]| {
         let fixed =
-            arguments!["bench", &path, "--frames", "3", "--views", "2", "--times", "2", "--size", "64x64"].to_vec();
+            arguments!["bench", path, "--frames", "3", "--views", "2", "--times", "2", "--size", "64x64"].to_vec();
         gs4d(&[fixed, more.iter().map(Into::into).collect()].concat())
     };
-    let json = bench(&["--json"]).json();
+    let json = bench(&path, &["--json"]).json();
     let row = &json["rows"][0];
     assert_eq!((&row["views"], &row["timings"]["frames"]), (&4.into(), &3.into()), "two views at two times");
     assert!(row["timings"]["wall_milliseconds"].as_f64().is_some_and(|ms| ms > 0.0), "frames take time");
@@ -124,13 +154,16 @@ fn bench_reports_times_and_counts() {
     assert!(0.0 < contributing && contributing <= evaluated, "{contributing} of {evaluated} splats are blended");
     assert_eq!(row["timings"]["active"], 1000, "no filter");
     let ways = ["--renderer", "bins,sort", "--filter", "on,off", "--form", "stored,fp32", "--rounds", "2", "--json"];
-    let json = bench(&ways).json();
+    let (masked, packed) = (folder.path().join("masked.gs4d"), folder.path().join("packed.gs4d"));
+    gs4d(&arguments!["mask", &path, "-o", &masked]).text();
+    gs4d(&arguments!["compress", &masked, &packed, "--codebooks", "4", "--verify", "0"]).text();
+    let json = bench(&packed, &ways).json();
     let rows = json["rows"].as_array().expect("rows");
     assert_eq!(rows.len(), 8, "every combination");
     let counts: Vec<_> = rows.iter().map(|row| &row["timings"]["counts"]).collect();
     assert!(counts.iter().all(|found| *found == counts[0]), "the same counts in every row: {counts:?}");
     assert!(rows.iter().all(|row| row["rounds"]["count"] == 2), "two rounds");
-    assert!(bench(&[]).text().contains("frame, many in flight"), "a table");
+    assert!(bench(&path, &[]).text().contains("frame, many in flight"), "a table");
     gs4d(&arguments!["bench", &path, "--adapter", "no such card"]).must_fail("no such card");
 }
 

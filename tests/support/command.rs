@@ -3,8 +3,8 @@
 //! In: arguments. Out: exit code, standard output, standard error.
 
 use serde_json::Value;
-use std::ffi::OsStr;
-use std::path::PathBuf;
+use std::ffi::{OsStr, OsString};
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use tempfile::TempDir;
 
@@ -54,6 +54,19 @@ macro_rules! arguments {
     ($($argument:expr),* $(,)?) => { [$(std::ffi::OsString::from($argument)),*] };
 }
 pub(crate) use arguments;
+
+/// Returns the words of a command line. A word in capitals is the file of this name in the folder, in small letters; `OUT` has a number, so that
+/// no two commands write the same file.
+pub fn words(command: &str, folder: &Path, number: usize) -> Vec<OsString> {
+    let word = |word: &str| -> OsString {
+        match word.strip_prefix("OUT") {
+            Some(rest) => folder.join(format!("out{number}{rest}")).into(),
+            None if word.starts_with(|c: char| c.is_ascii_uppercase()) => folder.join(word.to_lowercase()).into(),
+            None => word.into(),
+        }
+    };
+    command.split_whitespace().map(word).collect()
+}
 
 /// Returns a temporary folder.
 pub fn folder() -> TempDir {

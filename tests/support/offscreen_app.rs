@@ -9,7 +9,7 @@ use bevy::core_pipeline::tonemapping::{DebandDither, Tonemapping};
 use bevy::prelude::*;
 use bevy::render::RenderPlugin;
 use bevy::render::pipelined_rendering::PipelinedRenderingPlugin;
-use bevy_gs4d::GaussianCapturePlugin;
+use bevy_gs4d::GaussianCapturePlugins;
 use bevy_gs4d::testing::{self, Offscreen};
 use image::RgbaImage;
 use std::time::Duration;
@@ -33,7 +33,7 @@ fn app_with(size: UVec2, adjust: fn(PluginGroupBuilder) -> PluginGroupBuilder) -
         return None;
     }
     let mut app = testing::app_with(size, adjust);
-    app.add_plugins((GaussianCapturePlugin, FlatPlugin)).insert_resource(ClearColor(Color::BLACK));
+    app.add_plugins((GaussianCapturePlugins, FlatPlugin)).insert_resource(ClearColor(Color::BLACK));
     Some(app)
 }
 

@@ -7,6 +7,7 @@
 use crate::support::event_log::record;
 use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
+use bevy_gs4d::playback::{MarkerReached, SegmentBoundCrossed};
 use bevy_gs4d::prelude::*;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{FilterKind, GaussianScene, TemporalFilter};
@@ -20,7 +21,7 @@ pub fn app(folder: &str) -> App {
 /// Returns the app of [`app`] with other settings of `AssetPlugin`.
 pub fn app_with(assets: AssetPlugin) -> App {
     let mut app = App::new();
-    app.add_plugins((MinimalPlugins, assets, GaussianCapturePlugin));
+    app.add_plugins((MinimalPlugins, assets, GaussianCapturePlugins));
     // Tests also make steps longer than Bevy's limit of a quarter of a second.
     app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::MAX);
     record::<PlaybackStarted>(&mut app, Last);

@@ -1,15 +1,16 @@
 //! Options for settings that a checkpoint does not contain.
 //!
-//! In: options, a path. Out: a scene.
+//! In: options, a path. Out: a scene; an error for an option that has no effect on it.
 
-use super::values;
+use super::effects::Need;
+use super::{Given, values};
 use crate::cli::failure::Failure;
 use crate::cli::note::note;
 use crate::codec::import::Imported;
-use crate::codec::{self, ReadOptions};
-use crate::gaussian::ShDirection;
+use crate::codec::{self, CodecError, InvalidOption, ReadOptions};
+use crate::gaussian::{Model, ShDirection};
 use crate::offline::train::CaptureSettings;
-use crate::scene::{GaussianScene, RotationConvention, TrainedCameras, UpAxis};
+use crate::scene::{GaussianScene, RotationConvention, SceneForm, TrainedCameras, UpAxis};
 use crate::view::RasterFov;
 use std::path::Path;
 
@@ -17,9 +18,11 @@ use std::path::Path;
 #[derive(clap::Args, Default)]
 #[command(next_help_heading = "What a checkpoint does not say (taken from cfg_args beside it, else the default)")]
 pub(crate) struct CheckpointArgs {
+    #[command(flatten)]
+    given: Given,
     /// First and last timestamp of training [default: 0,1].
     #[arg(long, value_name = "T0,T1", value_parser = values::interval, allow_hyphen_values = true)]
-    time_interval: Option<[f32; 2]>,
+    time_interval: Option<[f64; 2]>,
     /// Background color, 0 to 1 in the space of the pictures; also instead of a package's own [default: 0,0,0].
     #[arg(long, value_name = "R,G,B", value_parser = values::color, allow_hyphen_values = true)]
     pub background: Option<[f32; 3]>,
@@ -27,7 +30,7 @@ pub(crate) struct CheckpointArgs {
     #[arg(long, value_name = "CONVENTION", value_parser = values::one_of(&ROTATION_CONVENTIONS))]
     rotation_convention: Option<RotationConvention>,
     /// Field of view that shapes splats seen by intrinsics cameras: the original's placeholder or the true one; also instead
-    /// of a package's own [default: reference].
+    /// of a package's own [default: reference for checkpoints, corrected for files of other makes].
     #[arg(long, value_name = "FOV", value_parser = values::one_of(&RASTER_FOVS))]
     raster_fov: Option<RasterFov>,
     /// Kind of cameras of the training views; also instead of a package's own [default: intrinsics if there is an
@@ -43,7 +46,7 @@ pub(crate) struct CheckpointArgs {
     /// Added to the temporal variance in the marginal, if positive [default: -1].
     #[arg(long, value_name = "VARIANCE", value_parser = values::number, allow_hyphen_values = true)]
     prefilter_var: Option<f32>,
-    /// Axis that points up; also instead of a package's own [default: +z].
+    /// Axis that points up; also instead of that of a package or another file [default: +z].
     #[arg(long, value_name = "AXIS", value_parser = values::one_of(&UP_AXES), allow_hyphen_values = true)]
     up: Option<UpAxis>,
     /// Seconds of one pass through the time interval at speed 1, 0 for a still; also instead of a package's own or a dataset's [default:
@@ -54,7 +57,7 @@ pub(crate) struct CheckpointArgs {
     /// checkpoints].
     #[arg(long, value_name = "MARGINAL", value_parser = values::number)]
     cutoff: Option<f32>,
-    /// Frames a second of a sequence of files [default: 30].
+    /// Frames a second of a sequence of files, or of the frames in a PLY [default: 30].
     #[arg(long, value_name = "FPS", value_parser = values::number)]
     pub fps: Option<f32>,
     /// Largest distance between a curved path and the straight pieces that replace it, in middle scales of the Gaussian [default: 0.25].
@@ -79,32 +82,32 @@ const UP_AXES: [(&str, UpAxis); 6] = [
 ];
 
 impl CheckpointArgs {
-    /// The options that have an effect on checkpoints and packages alone, not on captures trained from pictures.
-    pub(crate) const OF_CHECKPOINTS: [&str; 10] = [
-        "--rotation-convention",
-        "--raster-fov",
-        "--trained-cameras",
-        "--sh-direction",
-        "--force-sh-3d",
-        "--prefilter-var",
-        "--up",
-        "--cutoff",
-        "--fps",
-        "--tolerance",
-    ];
-
     /// Returns the settings of a capture that is trained from pictures.
     pub(crate) fn capture(&self) -> CaptureSettings {
         let background = self.background.unwrap_or_default();
-        CaptureSettings { time_interval: self.time_interval, background, duration_seconds: self.duration }
+        CaptureSettings {
+            time_interval: self.time_interval,
+            background,
+            duration_seconds: self.duration,
+            ..CaptureSettings::default()
+        }
     }
 
     /// Opens a capture of any format, and notes what of it the scene does not show.
     ///
     /// # Errors
-    /// Errors of the codec; options that contradict the training settings in a package.
+    /// Errors of the codec; options that contradict the training settings in a package, or have no effect on the capture.
     pub(crate) fn load(&self, path: &Path) -> Result<GaussianScene, Failure> {
-        let Imported { scene, lost } = codec::load_stating(path, &self.options())?;
+        self.load_to_play(path, false)
+    }
+
+    /// Opens a capture for files that are played: as [`load`](Self::load); `--fps` has an effect on files that count frames, too.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load).
+    pub(crate) fn load_to_play(&self, path: &Path, counts_frames: bool) -> Result<GaussianScene, Failure> {
+        let Imported { scene, lost } = codec::load_stating(path, &self.options()).map_err(of_codec)?;
+        self.require_effects(path, &scene, counts_frames)?;
         for sentence in lost {
             note(&format!("note: {}: {sentence}", path.display()));
         }
@@ -124,9 +127,32 @@ impl CheckpointArgs {
         Ok(scene)
     }
 
+    /// Checks that every option that is for some formats alone has an effect on the scene of this file.
+    fn require_effects(&self, path: &Path, scene: &GaussianScene, counts_frames: bool) -> Result<(), Failure> {
+        let of_formats = [Need::FrameRate, Need::CurvedPaths, Need::NativeRotations, Need::Trainer];
+        if !of_formats.into_iter().any(|need| self.given.depends_on(need)) {
+            return Ok(());
+        }
+        let (format, _) = codec::inspect(path)?;
+        let is_own = ["checkpoint", "package"].contains(&format.id);
+        // Gaussians at rest of other makes are in the trained form.
+        let is_moving = matches!(scene.form, SceneForm::Ready(_));
+        let is_timed = is_own || !is_moving || format.id == "4dgs";
+        self.given.require(Need::FrameRate, counts_frames || !is_timed)?;
+        // Of other intervals the end depends on the rate, too.
+        let is_open = self.duration.is_none() || scene.trained_with.time_interval != [0.0, 1.0];
+        self.given.require(Need::OpenDuration, counts_frames || is_open)?;
+        // Pieces of paths have windows of time, which a filter opens.
+        let is_in_pieces = !is_own && format.id != "sequence" && scene.filter.is_some();
+        self.given.require(Need::CurvedPaths, is_in_pieces)?;
+        let is_native = matches!(scene.model(), Some(Model::Rotated4d | Model::Unrotated4d));
+        self.given.require(Need::NativeRotations, is_own || is_native)?;
+        self.given.require(Need::Trainer, is_own)
+    }
+
     fn options(&self) -> ReadOptions {
         ReadOptions {
-            time_interval: self.time_interval,
+            time_interval: self.time_interval.map(|interval| interval.map(|time| time as f32)),
             background: self.background,
             rotation_convention: self.rotation_convention,
             raster_fov: self.raster_fov,
@@ -142,4 +168,23 @@ impl CheckpointArgs {
             sequence: false,
         }
     }
+}
+
+/// Returns the failure of a file that cannot be read. An option that is refused is called as on the command line.
+fn of_codec(error: CodecError) -> Failure {
+    match error.kind.invalid_option() {
+        Some(InvalidOption { name, reason }) => Failure::about(&error.path, &format!("{}: {reason}", option_of(name))),
+        None => error.into(),
+    }
+}
+
+/// Returns the option that sets a field of [`ReadOptions`].
+fn option_of(field: &str) -> String {
+    let other = match field {
+        "cameras" => Some("trained-cameras"),
+        "duration_seconds" => Some("duration"),
+        "marginal_cutoff" => Some("cutoff"),
+        _ => None,
+    };
+    format!("--{}", other.map_or(field.replace('_', "-"), str::to_owned))
 }

@@ -27,6 +27,9 @@ pub(crate) struct DataArgs {
     /// Divisor of the picture size (1, 2, 3, 4, 8), -1 (at most 1600 wide) or a target width, as in training.
     #[arg(long, value_name = "N", allow_negative_numbers = true, conflicts_with = "size", requires = "data")]
     resolution: Option<i32>,
+    /// Read every view at time 0, as of a scene at rest; images in subfolders of a COLMAP dataset are then no frames of cameras.
+    #[arg(id = "static", long = "static", requires = "data")]
+    is_static: bool,
 }
 
 impl DataArgs {
@@ -49,7 +52,7 @@ impl DataArgs {
         trained_with: &TrainedWith,
         progress: &mut dyn Progress,
     ) -> Result<Vec<TrainingView>, Failure> {
-        let options = SplitOptions { size: self.size, resolution: self.resolution, validation: Validation::None };
+        let options = self.options(Validation::None);
         Ok(open_split(self.folder()?, Split::Train, &options, trained_with, progress).map_err(or_give_size)?.views)
     }
 
@@ -63,12 +66,17 @@ impl DataArgs {
         trained_with: &TrainedWith,
         progress: &mut dyn Progress,
     ) -> Result<Splits, Failure> {
-        let options = SplitOptions { size: self.size, resolution: self.resolution, validation: validation.validation };
+        let options = self.options(validation.validation);
         let splits = Splits::open(self.folder()?, &options, trained_with, progress);
         splits.map_err(|error| match error {
             OfflineError::Dataset(error) => or_give_size(error),
             error => error.into(),
         })
+    }
+
+    /// Returns how the views are read and divided.
+    fn options(&self, validation: Validation) -> SplitOptions {
+        SplitOptions { size: self.size, resolution: self.resolution, validation, is_static: self.is_static }
     }
 
     fn folder(&self) -> Result<&Path, Failure> {
@@ -110,6 +118,9 @@ pub(crate) struct SplitArgs {
     /// Divisor of the picture size (1, 2, 3, 4, 8), -1 (at most 1600 wide) or a target width, as in training.
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub resolution: Option<i32>,
+    /// Read every view at time 0, as of a scene at rest; images in subfolders of a COLMAP dataset are then no frames of cameras.
+    #[arg(id = "static", long = "static")]
+    pub is_static: bool,
 }
 
 impl SplitArgs {
@@ -133,7 +144,7 @@ impl SplitArgs {
 
     /// Returns how the views are read and divided.
     pub(crate) fn options(&self, validation: Validation) -> SplitOptions {
-        SplitOptions { size: None, resolution: self.resolution, validation }
+        SplitOptions { size: None, resolution: self.resolution, validation, is_static: self.is_static }
     }
 
     /// Returns the views to train on and those to validate on.

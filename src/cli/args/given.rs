@@ -1,30 +1,35 @@
 //! The options that a command line names, and the refusal of those that have no effect.
 //!
-//! In: the arguments of a verb. Out: an error that names the first option without an effect, and why it has none. What can be said about two
-//! options whatever their values is said to clap (`conflicts_with`, `requires`); what depends on a value is checked here.
+//! In: the arguments of a verb, and what its input or its other options lack. Out: an error that names the first option without an effect, why it
+//! has none, and the remedy. The table of [`effects`](super::effects) decides.
 
+use super::effects::{Need, RULES};
 use crate::cli::failure::Failure;
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Args, Command, FromArgMatches};
 
-/// The options that the command line names, without those that have their default values. It must be the first field of the options of a verb:
-/// the fields before it have taken their values out of the matches.
+/// The options that the command line names, without those that have their default values. It must be the first field of the options of a verb,
+/// or of a group of options: the fields before it have taken their values out of the matches.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Given(Vec<String>);
 
-/// Why a time degree has no effect beside a low spatial degree.
-pub(crate) const WITHOUT_TIME: &str = "with --sh-degree below 3: only color of degree 3 depends on time";
-
 impl Given {
-    /// Checks that none of these options (`--name`) is named; `reason` completes the sentence "OPTION has no effect ...".
+    /// Checks that no option is named that has no effect, if a need of such options is not met.
     ///
     /// # Errors
     /// The first of the options that is named.
-    pub(crate) fn none_of(&self, options: &[&str], reason: &str) -> Result<(), Failure> {
-        match options.iter().find(|option| self.has(option)) {
-            Some(option) => Err(Failure::new(format!("{option} has no effect {reason}; leave it out"))),
+    pub(crate) fn require(&self, need: Need, is_met: bool) -> Result<(), Failure> {
+        let unmet = RULES.iter().filter(|rule| rule.need == need && !is_met);
+        let mut useless = unmet.flat_map(|rule| rule.options.iter().map(move |option| (*option, rule.reason)));
+        match useless.find(|(option, _)| self.has(option)) {
+            Some((option, reason)) => Err(Failure::new(format!("{option} has no effect {reason}; leave it out"))),
             None => Ok(()),
         }
+    }
+
+    /// Returns whether an option is named that has no effect unless a need is met.
+    pub(crate) fn depends_on(&self, need: Need) -> bool {
+        self.require(need, false).is_err()
     }
 
     /// Returns whether an option (`--name`) is named.
@@ -71,16 +76,48 @@ mod tests {
         mean_bits: u32,
         #[arg(long)]
         sparse: bool,
+        #[command(flatten)]
+        group: Group,
+    }
+
+    /// Options with a list of their own.
+    #[derive(clap::Args)]
+    struct Group {
+        #[command(flatten)]
+        given: Given,
+        #[arg(long)]
+        fps: Option<u32>,
+    }
+
+    fn options(arguments: &[&str]) -> Options {
+        Options::try_parse_from([&["gs4d"], arguments].concat()).expect("valid options")
     }
 
     #[test]
     fn options_with_default_values_are_not_given() {
-        let of = |arguments: &[&str]| Options::try_parse_from([&["gs4d"], arguments].concat()).expect("valid options");
-        let options = of(&["--mean-bits", "3"]);
-        assert_eq!((options.mean_bits, options.sparse), (3, false), "values are parsed as without the list");
-        let refused = options.given.none_of(&["--sparse", "--mean-bits"], "here").expect_err("it is named");
-        assert_eq!(refused.message(), "--mean-bits has no effect here; leave it out", "the option and the reason");
-        of(&["--sparse"]).given.none_of(&["--mean-bits"], "here").expect("a default value is not refused");
-        assert!(of(&["--sparse"]).given.none_of(&["--sparse"], "here").is_err(), "flags are options");
+        let given = options(&["--mean-bits", "3", "--sparse"]);
+        assert_eq!((given.mean_bits, given.sparse), (3, true), "values are parsed as without the list");
+        assert!(given.given.has("--mean-bits") && given.given.has("--sparse"), "options and flags that are named");
+        assert!(!options(&["--sparse"]).given.has("--mean-bits"), "a default value is not named");
+    }
+
+    #[test]
+    fn options_without_an_effect_are_refused_with_the_reason() {
+        let given = options(&["--mean-bits", "3"]).given;
+        let refused = given.require(Need::Quantized, false).expect_err("it is named");
+        let sentence = "--mean-bits has no effect with --quality lossless, which changes no value; leave it out";
+        assert_eq!(refused.message(), sentence, "the option, the reason and the remedy");
+        given.require(Need::Quantized, true).expect("the need is met");
+        given.require(Need::Gpu, false).expect("no option of a GPU is named");
+        assert!(given.depends_on(Need::Quantized) && !given.depends_on(Need::Gpu), "some options depend on it");
+    }
+
+    #[test]
+    fn a_group_of_options_has_a_list_of_its_own() {
+        let parsed = options(&["--fps", "3", "--sparse"]);
+        assert_eq!(parsed.group.fps, Some(3), "the value is parsed");
+        for given in [&parsed.given, &parsed.group.given] {
+            given.require(Need::FrameRate, false).expect_err("both lists have the option");
+        }
     }
 }

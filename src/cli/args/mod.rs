@@ -4,6 +4,7 @@
 
 mod checkpoint;
 mod data;
+mod effects;
 mod engine;
 mod given;
 mod package;
@@ -15,8 +16,11 @@ mod views;
 
 pub(super) use checkpoint::CheckpointArgs;
 pub(super) use data::{DataArgs, SplitArgs, ValidationArgs};
+pub(super) use effects::Need;
+#[cfg(test)]
+pub(super) use effects::RULES;
 pub(super) use engine::{DesignArgs, EngineArgs, RendererArgs, RenderersArgs};
-pub(super) use given::{Given, WITHOUT_TIME};
+pub(super) use given::Given;
 pub(super) use package::{PackageArgs, file_size};
 pub(super) use scoring::{ScoringArgs, score_choice};
 pub(super) use shards::{PART, Portion, ShardArgs};

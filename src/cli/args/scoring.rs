@@ -2,6 +2,7 @@
 //!
 //! In: the name of a score, the options for scoring. Out: a [`ScoreChoice`], [`ScoringSettings`].
 
+use super::effects::Need;
 use super::{Given, values};
 use crate::cli::failure::Failure;
 use crate::offline::score::Variant;
@@ -41,10 +42,8 @@ impl ScoringArgs {
     /// An option that has no effect.
     pub(crate) fn check(&self, given: &Given, choices: &[ScoreChoice]) -> Result<(), Failure> {
         let mut variants = choices.iter().flat_map(|choice| choice.variants(true));
-        if !variants.any(Variant::needs_volume) {
-            return given.none_of(&["--volume-power", "--volume-rank"], "on scores that do not use the volume");
-        }
-        if self.volume_power == 0.0 { given.none_of(&["--volume-rank"], "with --volume-power 0") } else { Ok(()) }
+        given.require(Need::VolumeScore, variants.any(Variant::needs_volume))?;
+        given.require(Need::VolumeWeight, self.volume_power != 0.0)
     }
 
     /// Returns the settings of the library.

@@ -3,6 +3,7 @@
 //! In: `--shard I/N`, or `--merge PART...`. Out: which shard to compute, or the parts to put together.
 
 use super::Given;
+use super::effects::Need;
 use crate::cli::failure::Failure;
 use crate::offline::shard::Shard;
 use std::path::{Path, PathBuf};
@@ -56,14 +57,11 @@ impl ShardArgs {
         out.ok_or_else(|| Failure::new("no OUT is given: name the part to write, with -o"))
     }
 
-    /// Checks that none of these options, which have an effect on the whole alone, is given with `--shard`.
+    /// Checks that no option that has an effect on the whole alone is given with `--shard`.
     ///
     /// # Errors
     /// The first of them that is given.
-    pub(crate) fn check(&self, given: &Given, of_whole: &[&str]) -> Result<(), Failure> {
-        match self.shard {
-            Some(_) => given.none_of(of_whole, "with --shard: give it with --merge"),
-            None => Ok(()),
-        }
+    pub(crate) fn check(&self, given: &Given) -> Result<(), Failure> {
+        given.require(Need::Whole, self.shard.is_none())
     }
 }

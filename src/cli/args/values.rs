@@ -20,11 +20,12 @@ pub(crate) fn color(text: &str) -> Result<[f32; 3], String> {
     numbers(text).ok_or_else(|| "expected three numbers, such as 0,0.5,1".to_owned())
 }
 
-/// Parses `T0,T1` with T0 before T1.
-pub(crate) fn interval(text: &str) -> Result<[f32; 2], String> {
-    numbers::<2>(text)
-        .filter(|[t0, t1]| t0 < t1)
-        .ok_or_else(|| "expected two numbers in order, such as 0,10".to_owned())
+/// Parses `T0,T1` with T0 before T1, in double precision: seconds since 1970 have no place in single precision.
+pub(crate) fn interval(text: &str) -> Result<[f64; 2], String> {
+    let time = |text: &str| text.trim().parse::<f64>().ok().filter(|time| time.is_finite());
+    let times = text.split_once(',').and_then(|(first, last)| time(first).zip(time(last)));
+    let times = times.filter(|(first, last)| first < last).map(|(first, last)| [first, last]);
+    times.ok_or_else(|| "expected two numbers in order, such as 0,10".to_owned())
 }
 
 /// Parses a finite number.
@@ -115,7 +116,10 @@ mod tests {
         assert!(not_negative("-1").is_err() && not_negative("inf").is_err(), "finite and not below zero");
         assert!(not_negative("1e6").is_ok() && not_negative("1e308").is_err(), "no more than any use needs");
         assert!(step("-1").is_err() && step("1e308").is_err(), "in single precision and not below zero");
-        assert!(interval("1,1").is_err(), "an interval has a length");
+        for text in ["1,1", "1", "1,2,3", "0,inf", "nan,1"] {
+            assert!(interval(text).is_err(), "{text:?} is no interval with a length");
+        }
+        assert_eq!(interval("1700000000, 1700000000.5"), Ok([1_700_000_000.0, 1_700_000_000.5]), "every digit");
         assert!(positive("0").is_err(), "zero is not above zero");
         assert!(seconds("0").is_ok() && seconds("-1").is_err() && seconds("nan").is_err(), "a still has no seconds");
     }

@@ -42,6 +42,11 @@ impl ViewArgs {
         self.cameras.iter().fold(files, |files, path| files.reads_cameras(path))
     }
 
+    /// Returns whether the views are on an orbit about the axis that points up.
+    pub(crate) fn are_of_orbit(&self) -> bool {
+        self.cameras.is_none()
+    }
+
     /// Returns how many views to use: all of `--orbit` if it is given, else `count`.
     pub(crate) fn limit(&self, count: usize) -> usize {
         self.orbit.unwrap_or(count)
@@ -60,7 +65,12 @@ impl ViewArgs {
                         "has the sizes of its pictures, on which --resolution has no effect: give --size, or neither";
                     return Err(Failure::about(path, reason));
                 }
-                let options = CameraOptions { size: self.size, resolution: self.resolution, time_interval: None };
+                let options = CameraOptions {
+                    size: self.size,
+                    resolution: self.resolution,
+                    origin: Some(scene.trained_with.origin),
+                    ..CameraOptions::default()
+                };
                 let views = CameraFile::load(path, &options).map_err(or_give_size)?;
                 views.into_iter().map(|view| Shot { name: view.name, camera: view.camera, time: view.time }).collect()
             }

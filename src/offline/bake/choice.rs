@@ -38,25 +38,6 @@ pub(super) struct Choice {
     pub tried: Vec<Tried>,
 }
 
-/// Checks before the scoring that the images of the validation views exist: a loss is measured on them.
-///
-/// # Errors
-/// There are no validation views, or an image is missing.
-pub(super) fn require_validation(inputs: &Inputs<'_>) -> Result<(), OfflineError> {
-    let Goal::MaxLoss(_) = inputs.settings.goal else { return Ok(()) };
-    if inputs.splits.validation.is_empty() {
-        return Err(OfflineError::NoValidation { what: "the loss allowed" });
-    }
-    match inputs.splits.validation.iter().find(|view| !view.image.is_file()) {
-        Some(view) => Err(OfflineError::at(
-            &view.image,
-            "is missing: a loss is measured on the images of the validation views; put them beside the camera file, \
-             or give --ratio or --keep",
-        )),
-        None => Ok(()),
-    }
-}
-
 /// The stage score: scores the Gaussians by the views to train on. `None` if that was one shard alone.
 pub(super) fn score(
     inputs: &mut Inputs<'_>,

@@ -2,6 +2,7 @@
 //!
 //! In: a scene, [`BakeSettings`]. Out: the views of its dataset, divided; the folder of results; the keys of the contents of all inputs.
 
+use super::ahead::check;
 use crate::offline::bake_settings::BakeSettings;
 use crate::offline::belonging::require_belonging;
 use crate::offline::convert::require_no_windows;
@@ -9,8 +10,6 @@ use crate::offline::dataset::TrainingView;
 use crate::offline::engine::Engine;
 use crate::offline::fine_tune::{FineTuneSettings, ImageRoom, TrainingImages, obstacle};
 use crate::offline::jobs::job::{FOLDER, Job, Scoring};
-use crate::offline::memory_check::{BY_RESOLUTION, Pictures};
-use crate::offline::metrics::MetricSet;
 use crate::offline::search::Goal;
 use crate::offline::splits::Splits;
 use crate::offline::store::{Key, Store};
@@ -60,13 +59,13 @@ impl<'a> Inputs<'a> {
         let splits = Splits::open(data, options, &scene.trained_with, progress)?;
         progress.note(&splits.to_string());
         let views = splits.all_training(&scene.trained_with, progress)?;
+        check(settings, &splits, &views, engine, obstacle(&scene.form, &views).is_none())?;
         scene.trained_with.validation = Some(splits.to_string());
         let read = format!("{:?} {:?} {:?}", scene.trained_with, scene.playback, settings.background);
         let scene_key = Key::of_files(&[checkpoint])?.and(env!("CARGO_PKG_VERSION")).and(&read);
         let cameras_key = Key::of(format!("{:?} {:?}", splits.train, splits.validation).as_bytes());
         let trained = Key::of_images(&splits.train, progress)?;
         let image_keys = [trained, Key::of_images(&splits.validation, progress)?];
-        require_room(engine, settings, &views, &splits)?;
         let mut subject = Subject::new(checkpoint, scene, settings.background)?;
         let pixel = trained_pixel(&subject.scene, &views);
         (subject.scene.trained_with.pixel, subject.runtime.trained_with.pixel) = (pixel, pixel);
@@ -75,12 +74,7 @@ impl<'a> Inputs<'a> {
         if checks && !settings.trust_images {
             require_belonging(engine, &subject.runtime, &views, subject.background)?;
         }
-        let inputs =
-            Self { settings, engine, subject, splits, views, store, scene_key, cameras_key, image_keys, images: None };
-        if let (Some(tuning), Engine::Gpu(headless)) = (inputs.tunes(), &*inputs.engine) {
-            tuning.sums.check(headless)?;
-        }
-        Ok(inputs)
+        Ok(Self { settings, engine, subject, splits, views, store, scene_key, cameras_key, image_keys, images: None })
     }
 
     /// Returns the key of the contents of all images that a training depends on.
@@ -124,8 +118,7 @@ impl<'a> Inputs<'a> {
 
     /// Returns the number of key-frames of the filter.
     pub(super) fn key_frames(&self) -> u32 {
-        let count = self.settings.key_frames.count(&self.views);
-        u32::try_from(count).unwrap_or(u32::MAX).clamp(2, MAX_SEGMENTS + 1)
+        key_frames(self.settings, &self.views)
     }
 
     /// Returns the most bytes that the package may have.
@@ -137,19 +130,7 @@ impl<'a> Inputs<'a> {
     }
 }
 
-/// Checks that the pictures of every stage fit the memory and the GPU, before the first stage.
-fn require_room(
-    engine: &Engine,
-    settings: &BakeSettings,
-    views: &[TrainingView],
-    splits: &Splits,
-) -> Result<(), OfflineError> {
-    Pictures::looked_at(views).require(engine.headless(), BY_RESOLUTION)?;
-    Pictures::compared(&splits.validation).require(engine.headless(), BY_RESOLUTION)?;
-    // The test views, which are of the same sizes.
-    Pictures::evaluated(views, MetricSet::ALL, true).require(engine.headless(), BY_RESOLUTION)?;
-    match (engine, &settings.fine_tune) {
-        (Engine::Gpu(headless), Some(_)) => TrainingImages::require_room(&splits.train, &splits.validation, headless),
-        _ => Ok(()),
-    }
+/// Returns the number of key-frames of the filter, given every training view.
+pub(super) fn key_frames(settings: &BakeSettings, views: &[TrainingView]) -> u32 {
+    u32::try_from(settings.key_frames.count(views)).unwrap_or(u32::MAX).clamp(2, MAX_SEGMENTS + 1)
 }

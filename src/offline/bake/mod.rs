@@ -8,6 +8,8 @@
 //! Every choice (score, count, step) depends on the validation views alone, which are not trained on; test views are drawn for the report,
 //! after the last choice.
 
+mod ahead;
+mod before_training;
 mod choice;
 mod compression;
 mod inputs;
@@ -17,6 +19,8 @@ mod summary;
 mod tuning;
 
 pub use super::bake_settings::BakeSettings;
+pub(crate) use ahead::{obstacle_to_tuning, require_validation};
+pub(crate) use before_training::check_pictures;
 
 use super::engine::Engine;
 use super::jobs::job::Job;
@@ -28,7 +32,7 @@ use super::stages::Stages;
 use super::test_comparison::compare_test_views;
 use super::{OfflineError, Progress, sliced};
 use crate::scene::GaussianScene;
-use choice::{choose, require_validation, score};
+use choice::{choose, score};
 use compression::{compress, mask};
 use inputs::Inputs;
 use rounds::thin;
@@ -99,7 +103,6 @@ fn stages_of(
     settings.check_files()?;
     require_unpacked(&scene.form).map_err(|error| OfflineError::at(&settings.checkpoint, error))?;
     let mut inputs = Inputs::open(scene, settings, job, engine, progress)?;
-    require_validation(&inputs)?;
     require_room(&inputs)?;
     let store = inputs.store.clone();
     let mut stages = Stages::begin("bake", STAGES, &store, progress).only(job.map(|job| job.stage));

@@ -10,6 +10,7 @@ use crate::offline::prune::highest;
 use crate::offline::search::Goal;
 use crate::offline::store::{Key, Store};
 use crate::offline::{OfflineError, Progress};
+use crate::scene::GaussianScene;
 use serde::{Deserialize, Serialize};
 
 /// Most packages that a bake makes.
@@ -67,7 +68,7 @@ impl Attempts {
             let kept = inputs.store.keep_aside("too-large", "gs4d", package)?;
             let single = if before <= 1 { "not even with a single Gaussian; " } else { "" };
             let found = format!("{single}the last package that was made has {size} and is kept as {}", kept.display());
-            return Err(too_small(inputs, limit, &found));
+            return Err(too_small(inputs.settings, limit, &found));
         }
         let one = size_of(inputs, &highest(scores, 1))?;
         let next = fitting(before, size, limit, one).clamp(1, before - 1);
@@ -84,12 +85,26 @@ impl Attempts {
 /// # Errors
 /// These parts do not fit.
 pub(super) fn require_room(inputs: &Inputs<'_>) -> Result<(), OfflineError> {
-    let Goal::Size(limit) = inputs.settings.goal else { return Ok(()) };
-    let least = size_of(inputs, &[])?;
-    if least > limit {
-        return Err(too_small(inputs, limit, &format!("a package without Gaussians has {least}")));
+    require_least(&inputs.subject.scene, inputs.settings, inputs.key_frames(), inputs.tunes().is_some())
+}
+
+/// Checks that a package without any of the Gaussians of a scene fits. `is_trained`: whether what is left of them is trained.
+///
+/// # Errors
+/// It does not fit.
+pub(super) fn require_least(
+    scene: &GaussianScene,
+    settings: &BakeSettings,
+    key_frames: u32,
+    is_trained: bool,
+) -> Result<(), OfflineError> {
+    let Goal::Size(limit) = settings.goal else { return Ok(()) };
+    let BakeSettings { quality, level, .. } = *settings;
+    let least = Packages { scene, key_frames, quality, level, is_trained }.size_of(&[])?;
+    match least > limit {
+        true => Err(too_small(settings, limit, &format!("a package without Gaussians has {least}"))),
+        false => Ok(()),
     }
-    Ok(())
 }
 
 /// Returns how many of the Gaussians with the highest scores fit into a package of this many bytes, before they are trained.
@@ -105,7 +120,7 @@ pub(super) fn count_of_size(
     let total = inputs.subject.scene.len();
     let one = size_of(inputs, &highest(scores, 1))?;
     if one > limit {
-        return Err(too_small(inputs, limit, &format!("a package of a single Gaussian has {one}")));
+        return Err(too_small(inputs.settings, limit, &format!("a package of a single Gaussian has {one}")));
     }
     count_within(limit, total, one, |count| size_of(inputs, &highest(scores, count)), progress)
 }
@@ -118,10 +133,10 @@ fn size_of(inputs: &Inputs<'_>, kept: &[u32]) -> Result<u64, OfflineError> {
 }
 
 /// Returns the error for a limit that no package meets; `found` describes the smallest package.
-fn too_small(inputs: &Inputs<'_>, limit: u64, found: &str) -> OfflineError {
+fn too_small(settings: &BakeSettings, limit: u64, found: &str) -> OfflineError {
     let remedy = "choose a lower quality or a larger size; a file that was here before has not changed";
     let reason = format!("this capture does not fit into {limit} bytes: {found}; {remedy}");
-    OfflineError::at(&inputs.settings.out, reason)
+    OfflineError::at(&settings.out, reason)
 }
 
 #[cfg(test)]

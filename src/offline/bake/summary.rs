@@ -9,14 +9,14 @@ use crate::gaussian::Gaussian;
 use crate::offline::OfflineError;
 use crate::offline::bake_settings::BakeSettings;
 use crate::offline::names;
-use crate::offline::quantize::Quality;
+use crate::offline::quantize::{Quality, broken_promises};
 use crate::offline::report::{
     Activity, BakeReport, Change, SectionSize, StageTime, VarianceHistogram, even_times, filter_shares,
 };
 use crate::offline::search::Goal;
 use crate::offline::temporal_filter::filter_name;
 use crate::offline::test_comparison::Compared;
-use crate::scene::{TemporalFilter, TrainedWith};
+use crate::scene::{Form, SceneForm, TemporalFilter, TrainedWith};
 use std::fs;
 use std::io::Cursor;
 
@@ -48,7 +48,7 @@ impl Facts<'_> {
         let times = even_times(interval, TIMES);
         let info = package::inspect(Cursor::new(self.package)).map_err(|error| OfflineError::at(out, error))?;
         let original = fs::metadata(checkpoint).map_err(|error| OfflineError::at(checkpoint, error))?;
-        let choices = self.choices();
+        let (choices, warnings) = (self.choices(), self.warnings()?);
         let (split, evaluation, samples) = match self.compared {
             Some(compared) => (Some(compared.split.to_owned()), Some(compared.evaluation), compared.samples),
             None => (None, None, Vec::new()),
@@ -61,6 +61,7 @@ impl Facts<'_> {
             gaussians: Change { before: self.before.len(), after: self.after.len() },
             bytes: Change { before: original.len(), after: self.package.len() as u64 },
             choices,
+            warnings,
             stages: self.stages,
             sections: SectionSize::by_name(&info.header.sections),
             variances: VarianceHistogram::of(self.before, self.after),
@@ -76,6 +77,16 @@ impl Facts<'_> {
             evaluation,
             samples,
         })
+    }
+
+    /// Returns what the quality promises and the package does not keep. Its pictures are compared with the images of the test views, not with those
+    /// of the checkpoint.
+    fn warnings(&self) -> Result<Vec<String>, OfflineError> {
+        let scene = package::read(Cursor::new(self.package));
+        match scene.map_err(|error| OfflineError::at(&self.settings.out, error))?.form {
+            SceneForm::Ready(Form::Packed(packed)) => Ok(broken_promises(self.settings.quality, &packed, None)),
+            SceneForm::Ready(Form::Sliced(_)) | SceneForm::Trained(_) => Ok(Vec::new()),
+        }
     }
 
     /// Returns the choices of the user and of the bake, as readable names and values.

@@ -6,6 +6,7 @@
 //! Needs are estimates by the numbers of Gaussians, views and pixels, for time limits and the choice of machines.
 
 use super::job::{FOLDER, shard_name};
+use crate::offline::bake::require_validation;
 use crate::offline::bake_settings::BakeSettings;
 use crate::offline::dataset::TrainingView;
 use crate::offline::dataset::selection::distinct_cameras;
@@ -119,6 +120,7 @@ pub(crate) fn plan(
         Source::Pictures(..) => &any_time,
     };
     let splits = Splits::open(&settings.data, &settings.splits, trained_with, progress)?;
+    require_validation(settings, &splits)?;
     let views = splits.all_training(trained_with, progress)?;
     let is_tuned = gpu
         && match source {

@@ -1,0 +1,147 @@
+//! The remedies in errors of the command.
+//!
+//! In: command lines that fail, on captures and datasets made here. Out: proof that the error names a remedy, and that the command line that follows
+//! it succeeds. `src/cli/remedies.rs` checks that every verb and option in a message exists.
+
+use crate::support::command::{arguments, folder, gs4d, scene, words};
+use crate::support::dataset;
+use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use glam::{UVec2, Vec3};
+use serde_json::Value;
+use std::fs;
+use tempfile::TempDir;
+
+/// A command line that fails, the remedy in its error, and the command line that follows it. Words in capitals are files: see [`words`].
+const REMEDIES: &[(&str, &str, &str)] = &[
+    (
+        "prune SCENE.gs4d --ratio 0.5 -o OUT.gs4d",
+        "give --data DIR",
+        "prune SCENE.gs4d --ratio 0.5 -o OUT.gs4d --data DATA --variant energy --engine cpu",
+    ),
+    (
+        "mask SCENE.gs4d --filter interval -o OUT.gs4d",
+        "give --data DIR",
+        "mask SCENE.gs4d --filter interval -o OUT.gs4d --data DATA --engine cpu",
+    ),
+    (
+        "bake SCENE.gs4d -o OUT.gs4d",
+        "give --data DIR",
+        "bake SCENE.gs4d -o OUT.gs4d --data DATA --engine cpu --ratio 0.5 --variant energy",
+    ),
+    (
+        "score SCENE.gs4d --data FEW --out OUT.f32 --engine cpu",
+        "or name a score with --variant",
+        "score SCENE.gs4d --data FEW --out OUT.f32 --engine cpu --variant energy",
+    ),
+    (
+        "score SCENE.gs4d --data FEW --out OUT.f32 --engine cpu",
+        "give --validation cameras or times",
+        "score SCENE.gs4d --data FEW --out OUT.f32 --engine cpu --validation cameras --trust-images",
+    ),
+    (
+        "prune SCENE.gs4d --data FEW --max-loss 1 --variant energy --engine cpu -o OUT.gs4d",
+        "or give --ratio or --keep in its place",
+        "prune SCENE.gs4d --data FEW --keep 9 --variant energy --engine cpu -o OUT.gs4d",
+    ),
+    (
+        "bake SCENE.gs4d --data FEW --engine cpu -o OUT.gs4d",
+        "give --validation cameras or times",
+        "bake SCENE.gs4d --data FEW --engine cpu -o OUT.gs4d --validation times --trust-images",
+    ),
+    (
+        "ablate SCENE.gs4d --data FEW --engine cpu",
+        "or measure on the views of another --split",
+        "ablate SCENE.gs4d --data FEW --engine cpu --split test --trust-images --variants energy --ratios 0.5 --filters support",
+    ),
+    (
+        "score SCENE.gs4d --data SIZELESS --out OUT.f32 --variant energy --engine cpu",
+        "or give --size WxH",
+        "score SCENE.gs4d --data SIZELESS --out OUT.f32 --variant energy --engine cpu --size 16x16",
+    ),
+    (
+        "score SCENE.gs4d --data DATA --out FEW --variant energy --engine cpu",
+        "name a file, or give --variant all",
+        "score SCENE.gs4d --data DATA --out OUT --variant all --engine cpu",
+    ),
+    (
+        "score --merge SCENE.gs4d --variant energy --out OUT.f32",
+        "parts are written by --shard",
+        "score SCENE.gs4d --data DATA --variant energy --engine cpu --shard 0/1 --out OUT.gs4p",
+    ),
+    (
+        "bake SCENE.gs4d --data DATA -o OUT.gs4d --ratio 0.5 --plan OUT.json",
+        "give --engine gpu or --engine cpu with --plan",
+        "bake SCENE.gs4d --data DATA -o OUT.gs4d --ratio 0.5 --plan OUT.json --engine cpu",
+    ),
+    (
+        "bake SCENE.gs4d --data DATA -o OUT.gs4d --ratio 0.5 --variant energy --engine cpu --only prune",
+        "run --only score before --only prune",
+        "bake SCENE.gs4d --data DATA -o OUT.gs4d --ratio 0.5 --variant energy --engine cpu --only score --trust-images",
+    ),
+    ("compare A.f32 A.f32", "give --size WxH", "compare A.f32 A.f32 --size 4x4"),
+    ("export SCENE.gs4d OUT.ply", "give --time from 0 to 1, or --sequence", "export SCENE.gs4d OUT.ply --time 1"),
+    ("export SCENE.gs4d OUT", "or give --format", "export SCENE.gs4d OUT --format ply --time 1"),
+    (
+        "convert RUNTIME.gs4d -o OUT.gs4d --form trained",
+        "convert the checkpoint with --form trained",
+        "convert SCENE.gs4d -o OUT.gs4d --form trained",
+    ),
+    (
+        "compress PACKED.gs4d -o OUT.gs4d",
+        "name the checkpoint or the lossless package",
+        "compress SCENE.gs4d -o OUT.gs4d --verify 0 --codebooks 4",
+    ),
+    ("info SCENE.gs4d --cutoff 2", "--cutoff: 2 is not from 1/255 to below 1", "info SCENE.gs4d --cutoff 0.1"),
+];
+
+/// Makes the files that the command lines name.
+fn files() -> TempDir {
+    let folder = folder();
+    let path = |name: &str| folder.path().join(name);
+    let scene = scene(&folder, "60");
+    let runtime = synthesize(&SynthSettings { count: 60, ..SynthSettings::default() }).into_runtime();
+    let runtime = runtime.expect("a synthetic scene can be drawn");
+    for (name, cameras, times, images) in [("data", 4, 4, true), ("few", 3, 2, true), ("sizeless", 4, 4, false)] {
+        dataset::write(&path(name), &runtime, Vec3::ZERO, cameras, times, UVec2::splat(16), images);
+    }
+    let cameras = path("sizeless/transforms_train.json");
+    let mut json: Value = serde_json::from_str(&fs::read_to_string(&cameras).expect("a camera file")).expect("JSON");
+    for name in ["w", "h"] {
+        json.as_object_mut().expect("an object").remove(name);
+    }
+    fs::write(&cameras, json.to_string()).expect("the folder can be written to");
+    gs4d(&arguments!["convert", &scene, path("runtime.gs4d"), "--form", "runtime"]).text();
+    gs4d(&arguments!["compress", &scene, path("packed.gs4d"), "--codebooks", "4", "--verify", "0"]).text();
+    fs::write(path("a.f32"), [0; 4 * 4 * 3 * 4]).expect("the folder can be written to");
+    folder
+}
+
+#[test]
+fn what_an_error_says_to_do_can_be_done() {
+    let folder = files();
+    for (number, (failing, remedy, working)) in REMEDIES.iter().enumerate() {
+        let run = gs4d(&words(failing, folder.path(), number));
+        run.must_fail(remedy);
+        let run = gs4d(&words(working, folder.path(), number));
+        assert_eq!(run.code, Some(0), "{working}: {}", run.err);
+    }
+}
+
+#[test]
+fn options_are_called_by_their_names_on_the_command_line() {
+    let folder = folder();
+    scene(&folder, "20");
+    for (option, sentence) in [
+        ("--cutoff 0.001", "scene.gs4d: --cutoff: 0.001 is not from 1/255 to below 1"),
+        ("--fps 0", "scene.gs4d: --fps: 0 is not a positive number of frames a second"),
+        ("--tolerance 0", "scene.gs4d: --tolerance: 0 is not a positive part of a scale"),
+        ("--time-interval 0,9", "scene.gs4d: --time-interval: the package was made with another value"),
+        ("--prefilter-var 0.5", "scene.gs4d: --prefilter-var: the package was made with another value"),
+        (
+            "--rotation-convention unflipped",
+            "scene.gs4d: --rotation-convention: the package was made with another value",
+        ),
+    ] {
+        gs4d(&words(&format!("info SCENE.gs4d {option}"), folder.path(), 0)).must_fail(sentence);
+    }
+}
