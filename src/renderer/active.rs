@@ -80,12 +80,10 @@ impl ActiveList {
             let blocks = part.count.div_ceil(BLOCK);
             pass.set_bind_group(0, &self.activate, &[index as u32 * INSTANCE_STRIDE]);
             pass.set_bind_group(1, filter, &[]);
-            pass.set_pipeline(&renderer.activate_count);
-            pass.dispatch_workgroups(blocks, 1, 1);
-            pass.set_pipeline(&renderer.activate_scan);
-            pass.dispatch_workgroups(1, 1, 1);
-            pass.set_pipeline(&renderer.activate_store);
-            pass.dispatch_workgroups(blocks, 1, 1);
+            for (pipeline, blocks) in renderer.activate.iter().zip([blocks, 1, blocks]) {
+                pass.set_pipeline(pipeline);
+                pass.dispatch_workgroups(blocks, 1, 1);
+            }
         }
     }
 

@@ -1,8 +1,6 @@
 //! The designs: sequences of passes that draw a view.
 //!
-//! In: nothing. Out: [`Design`], the names of the designs, and the timed passes of each design.
-
-use super::{global_sort, tile_bins};
+//! In: nothing. Out: [`Design`], the names of the designs.
 
 /// The sequence of passes that draws a view. All designs draw the same picture.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
@@ -22,16 +20,4 @@ impl Design {
     /// All designs, by name.
     pub const NAMES: [(&'static str, Self); 3] =
         [("auto", Self::Auto), ("bins", Self::TileBins), ("sort", Self::GlobalSort)];
-
-    /// Returns the names of the passes that are timed, in frames with motions or without.
-    pub(super) fn timed_passes(self, motions: bool) -> &'static [&'static str] {
-        let all = match self {
-            Self::Auto | Self::TileBins => tile_bins::TIMED_PASSES,
-            Self::GlobalSort => global_sort::TIMED_PASSES,
-        };
-        if motions { all } else { &all[..all.len() - MOTION_PASSES] }
-    }
 }
-
-/// Number of passes that only a frame with motions has.
-const MOTION_PASSES: usize = 2;

@@ -1,6 +1,6 @@
-//! A device for commands, tests and pages, outside Bevy.
+//! A device for commands, tests and pages. An app with a device of its own needs none.
 //!
-//! In: the name or index of an adapter, or a surface to draw to, if any. Out: a [`GpuContext`]. Inside Bevy the renderer uses Bevy's device instead.
+//! In: the name or index of an adapter, or a surface to draw to, if any. Out: a [`GpuContext`].
 
 use super::error::GpuError;
 use pollster::block_on;

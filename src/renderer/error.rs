@@ -120,18 +120,6 @@ impl GpuError {
     /// Returns whether the device has reported the error: objects of the failed step are invalid. Other errors are found before an object is
     /// created.
     pub fn is_of_device(&self) -> bool {
-        match self {
-            Self::Memory { .. } | Self::Refused(_) | Self::Device(_) => true,
-            Self::NoAdapter { .. }
-            | Self::AdapterNotFound { .. }
-            | Self::NoDevice { .. }
-            | Self::Limit { .. }
-            | Self::Shader { .. }
-            | Self::TooLarge { .. }
-            | Self::TooManySplats { .. }
-            | Self::Picture { .. }
-            | Self::Size { .. }
-            | Self::Scene(_) => false,
-        }
+        matches!(self, Self::Memory { .. } | Self::Refused(_) | Self::Device(_))
     }
 }

@@ -168,8 +168,8 @@ pub struct Activation {
 }
 
 impl InstanceUniforms {
-    /// Creates the uniforms of a view and an appearance; slots and color settings are zero.
-    pub fn new(view: &View, appearance: &Appearance, space: BlendSpace, debug: DebugView) -> Self {
+    /// Returns these uniforms with those of a view and an appearance.
+    pub fn in_view(&self, view: &View, appearance: &Appearance, space: BlendSpace, debug: DebugView) -> Self {
         let m = view.world_to_camera;
         let [clip_x, clip_y] = view.clip_rows();
         let crop = glam::Mat4::from(appearance.crop.unwrap_or_default());
@@ -196,7 +196,7 @@ impl InstanceUniforms {
             tiles: view.tiles().to_array(),
             near: view.near,
             trained_variance: view.trained_variance().to_array(),
-            ..Self::zeroed()
+            ..*self
         }
     }
 }

@@ -37,12 +37,8 @@ impl Layouts {
             filter: new("gs4d filter", &[Read]),
             active: new("gs4d active list", &[Read]),
             captures: Storage::ALL.map(|storage| {
-                let (geometry, color): (&[Bind], &[Bind]) = match storage {
-                    Storage::Sliced => (&[Read, Read], &[Read]),
-                    Storage::Packed => (&[Read, Read], &[Read]),
-                    Storage::Coded => (&[Read, Read], &[Read, Read]),
-                };
-                [new("gs4d geometry", geometry), new("gs4d color", color)]
+                let color: &[Bind] = if storage == Storage::Coded { &[Read, Read] } else { &[Read] };
+                [new("gs4d geometry", &[Read, Read]), new("gs4d color", color)]
             }),
             pixel: Pixels::ALL.map(pixel),
             global_sort: SortLayouts::new(device),

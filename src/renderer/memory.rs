@@ -70,8 +70,8 @@ impl Allocator<'_> {
     }
 }
 
-/// Scopes that catch the errors of a device, which otherwise reach the handler of the app; Bevy's handler ends the app. Scopes belong to a
-/// thread: open and close them in one function.
+/// Scopes that catch the errors of a device, which otherwise reach the handler of the app, and may end it. Scopes belong to a thread: open and
+/// close them in one function.
 pub(crate) struct ErrorScopes([wgpu::ErrorScopeGuard; 3]);
 
 impl ErrorScopes {

@@ -1,4 +1,4 @@
-//! The renderer: plain wgpu, without Bevy.
+//! The renderer: plain wgpu.
 //!
 //! In: a [`RuntimeScene`](crate::scene::RuntimeScene) uploaded once ([`GpuCapture`]), views of it, and a device and an
 //! encoder. Out: color, transmittance and depth textures ([`ViewRenderer`]), or pictures ([`Headless`]). `activate`
@@ -12,8 +12,8 @@
 //!
 //! Before them `activate` lists the active Gaussians of a capture; after them, if the views of the previous frame are given, `motion` replaces the
 //! color of each splat by its motion, and the last pass runs once more, into a target of motions. All designs draw the same picture. The folders
-//! `global_sort` and `tile_bins` have a design each: variants, pipelines, buffers, recording; `view` chooses the design of a frame, and has what
-//! both need: sizes, uniforms, targets, counters.
+//! `global_sort` and `tile_bins` have a design each: variants, pipelines, buffers, recording; `view` chooses the design of a frame, has the
+//! trait through which it asks the design, `ViewDesign`, and what every view has: sizes, uniforms, targets, statistics.
 //!
 //! # Buffer capacity
 //!
@@ -58,6 +58,7 @@ mod layouts;
 pub(crate) mod memory;
 mod passes;
 mod pipelines;
+mod quiet;
 mod recording;
 pub(crate) mod shaders;
 mod statistics;
@@ -75,6 +76,7 @@ pub use error::GpuError;
 pub(crate) use global_sort::FinishedFrame;
 pub use headless::Headless;
 pub use pipelines::Renderer;
+pub use quiet::silence_wayland;
 pub use shaders::{ColorPrecision, ShaderChecks, Storage};
 pub use statistics::ViewStatistics;
 pub use timing::{PassTime, Timings};

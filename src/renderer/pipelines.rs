@@ -6,33 +6,26 @@ use super::bind::pipeline;
 use super::compiling::Compiling;
 use super::design::Design;
 use super::error::GpuError;
-use super::global_sort::AtOnce;
 use super::layout::INSTANCES_BOUND;
 use super::layouts::Layouts;
 use super::memory::Allocator;
 use super::passes::Passes;
-#[cfg(feature = "bevy")]
-use super::shaders::ColorPrecision;
-use super::shaders::{Pixels, SHADERS, ShaderChecks, Storage};
-#[cfg(feature = "bevy")]
-use super::tile_bins::Blending;
-use super::tile_bins::{BinVariant, Lists, Scratch};
+use super::shaders::{ColorPrecision, SHADERS, ShaderChecks, Storage};
+use super::tile_bins::{Blending, Scratch};
 use super::work::WorkCounters;
 use std::sync::Arc;
-#[cfg(feature = "bevy")]
 use std::thread::JoinHandle;
 
 /// All pipelines and bind group layouts of a device.
 #[derive(Debug)]
 pub struct Renderer {
     pub(super) layouts: Arc<Layouts>,
-    pub(super) activate_count: wgpu::ComputePipeline,
-    pub(super) activate_scan: wgpu::ComputePipeline,
-    pub(super) activate_store: wgpu::ComputePipeline,
+    /// The entry points of `activate`: `count`, `scan`, `store`.
+    pub(super) activate: [wgpu::ComputePipeline; 3],
     /// The passes of both designs and of motion.
     pub(super) passes: Arc<Passes>,
     /// The passes that are compiled on another thread; `None` if every pass is compiled by the thread that needs it.
-    compiling: Option<Compiling>,
+    pub(super) compiling: Option<Compiling>,
     /// Whether the driver is a software driver: threads copy the uniforms of their instance even in a dispatch of a single instance, and the
     /// loops of a thread may end early.
     pub(super) is_software: bool,
@@ -58,14 +51,9 @@ impl Renderer {
         let work = WorkCounters::default();
         let allocator = Allocator { device, work: &work };
         let no_list = allocator.buffer("gs4d no active list", 4, wgpu::BufferUsages::STORAGE);
-        let pipeline = |module: &wgpu::ShaderModule, entry: &str, groups: &[&wgpu::BindGroupLayout]| {
-            let groups: Vec<_> = groups.iter().copied().map(Some).collect();
-            pipeline(device, module, entry, &groups)
-        };
+        let groups = [&layouts.activate, &layouts.filter].map(Some);
         Ok(Self {
-            activate_count: pipeline(&activate, "count", &[&layouts.activate, &layouts.filter]),
-            activate_scan: pipeline(&activate, "scan", &[&layouts.activate, &layouts.filter]),
-            activate_store: pipeline(&activate, "store", &[&layouts.activate, &layouts.filter]),
+            activate: ["count", "scan", "store"].map(|entry| pipeline(device, &activate, entry, &groups)),
             passes: Arc::new(Passes::new(device, layouts.clone(), checks)),
             compiling: None,
             is_software: software,
@@ -108,89 +96,17 @@ impl Renderer {
         }
     }
 
-    /// Compiles the passes that the first frame of captures with this storage needs, as far as they are known.
-    ///
-    /// # Errors
-    /// When a shader does not compile.
-    pub(super) fn compile_ahead(
-        &self,
-        device: &wgpu::Device,
-        design: Design,
-        storage: Storage,
-    ) -> Result<(), GpuError> {
-        let drawn = std::iter::once((storage, false));
-        match self.resolve(design) {
-            Design::GlobalSort => self.passes.global_sort.compile(device, drawn, Pixels::default(), AtOnce::One),
-            Design::Auto | Design::TileBins => {
-                let lists = Lists::suiting(&device.limits(), 0);
-                self.passes.tile_bins.compile(device, drawn, BinVariant { lists, ..BinVariant::default() })
-            }
-        }
-    }
-
     /// Begins to compile, in the background, the passes that draw captures with this storage in an app: in half precision, behind surfaces with
     /// one or with several samples per pixel. Returns the thread; `None` if nothing is compiled in the background.
-    #[cfg(feature = "bevy")]
-    pub(crate) fn begin_ahead(&self, device: &wgpu::Device, storage: Storage) -> Option<JoinHandle<()>> {
+    pub fn begin_ahead(&self, device: &wgpu::Device, storage: Storage) -> Option<JoinHandle<()>> {
         let compiling = self.compiling.as_ref()?;
         let (passes, device, design) = (Arc::clone(&self.passes), device.clone(), self.resolve(Design::Auto));
         compiling.thread(move || {
-            let lists = Lists::suiting(&device.limits(), 0);
             for blending in [Blending::ColorBehindSurfaces, Blending::ColorBehindSamples] {
-                let variant = BinVariant { lists, blending, precision: ColorPrecision::Half, ..BinVariant::default() };
-                let drawn = std::iter::once((storage, false));
                 // A view that needs a refused pass returns the error.
-                let _ = match design {
-                    Design::GlobalSort => passes.global_sort.compile(&device, drawn, variant.pixels(), AtOnce::One),
-                    Design::Auto | Design::TileBins => passes.tile_bins.compile(&device, drawn, variant),
-                };
+                let _ = passes.compile_ahead(&device, design, storage, blending, ColorPrecision::Half);
             }
         })
-    }
-
-    /// Returns a variant of the passes of tile bins that is compiled: `wanted`, or while that is compiled in the background, another one
-    /// that draws the same picture. If there is none, `wanted` is compiled here.
-    ///
-    /// # Errors
-    /// When a shader does not compile.
-    pub(super) fn bin_variant(
-        &self,
-        device: &wgpu::Device,
-        drawn: impl Iterator<Item = (Storage, bool)> + Clone,
-        wanted: BinVariant,
-    ) -> Result<BinVariant, GpuError> {
-        let is_compiled = |variant: &BinVariant| self.passes.tile_bins.has(drawn.clone(), *variant);
-        if is_compiled(&wanted) {
-            return Ok(wanted);
-        }
-        if let Some(compiling) = &self.compiling
-            && let Some(substitute) = wanted.substitutes().find(is_compiled)
-        {
-            compiling.begin(&self.passes, device, drawn.collect(), wanted);
-            return Ok(substitute);
-        }
-        self.passes.tile_bins.compile(device, drawn, wanted)?;
-        Ok(wanted)
-    }
-
-    /// Returns the bind group layouts of geometry in single precision and of lists of active Gaussians.
-    pub(super) fn capture_layouts(&self) -> [&wgpu::BindGroupLayout; 2] {
-        [&self.layouts.captures[Storage::Sliced as usize][0], &self.layouts.active]
-    }
-
-    /// Creates the bind groups of the geometry and the color of one part of a capture. The buffers are in the order of the shaders' bindings.
-    pub(super) fn capture_bind_groups(
-        &self,
-        device: &wgpu::Device,
-        storage: Storage,
-        [geometry, color]: [&[wgpu::Buffer]; 2],
-    ) -> [wgpu::BindGroup; 2] {
-        let layouts = &self.layouts.captures[storage as usize];
-        let group = |layout: &wgpu::BindGroupLayout, buffers: &[wgpu::Buffer]| {
-            let resources: Vec<_> = buffers.iter().map(wgpu::Buffer::as_entire_binding).collect();
-            self.allocator(device).bind_group("gs4d capture", layout, &resources)
-        };
-        [group(&layouts[0], geometry), group(&layouts[1], color)]
     }
 }
 

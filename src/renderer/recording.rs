@@ -4,6 +4,7 @@
 
 use super::active::drawn_count;
 use super::layout::{INSTANCE_STRIDE, INSTANCES_AT_ONCE};
+use super::passes::MotionPass;
 use super::pipelines::Renderer;
 use super::shaders::Storage;
 use super::timing::PassTimer;
@@ -16,8 +17,11 @@ use glam::UVec2;
 pub(super) struct Recording<'a> {
     pub renderer: &'a Renderer,
     pub instances: &'a [Instance<'a>],
-    /// Size of the picture.
+    /// Size of the picture, and number of slots.
     pub picture: UVec2,
+    pub slots: u32,
+    /// Whether colors of splats are computed.
+    pub has_colors: bool,
     /// Uniforms, background, opaque depth and targets of the pixels.
     pub pixel: &'a wgpu::BindGroup,
     /// Timestamps, if the frame is timed.
@@ -63,27 +67,44 @@ impl Recording<'_> {
         }
     }
 
-    /// Records `blend` or `blend_blocks`: a workgroup for each tile. `lists` are the pass's own buffers.
+    /// Records `motion`: at most `most` workgroups for each part.
+    pub(super) fn dispatch_motion(
+        &self,
+        pass: &mut wgpu::ComputePass<'_>,
+        motion: &MotionPass,
+        group: &wgpu::BindGroup,
+        most: u32,
+    ) {
+        let mut index = 0;
+        for instance in self.instances {
+            let Some(pipeline) = motion.pipeline(instance.capture.storage) else { continue };
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(2, instance.active.map_or(&self.renderer.no_list, |active| &active.list), &[]);
+            for (at, part) in instance.capture.parts.iter().enumerate() {
+                let offset = index * INSTANCE_STRIDE;
+                pass.set_bind_group(0, group, &[offset, offset]);
+                pass.set_bind_group(1, &part.geometry, &[]);
+                let count = drawn_count(instance.capture, at, instance.active);
+                // 256 Gaussians per workgroup.
+                pass.dispatch_workgroups(count.div_ceil(256).min(most), 1, 1);
+                index += 1;
+            }
+        }
+        self.mark(pass);
+    }
+
+    /// Records a pass over pixels: a workgroup for each square of `side` x `side` tiles. `lists` are the pass's own buffers.
     pub(super) fn dispatch_tiles(
         &self,
         pass: &mut wgpu::ComputePass<'_>,
         pipeline: &wgpu::ComputePipeline,
         lists: &wgpu::BindGroup,
+        side: u32,
     ) {
-        self.dispatch_blocks(pass, pipeline, lists, tiles(self.picture));
-    }
-
-    /// Records a pass over pixels: so many workgroups across and down. `lists` are the pass's own buffers.
-    pub(super) fn dispatch_blocks(
-        &self,
-        pass: &mut wgpu::ComputePass<'_>,
-        pipeline: &wgpu::ComputePipeline,
-        lists: &wgpu::BindGroup,
-        blocks: UVec2,
-    ) {
+        let groups = tiles(self.picture).map(|tiles| tiles.div_ceil(side));
         pass.set_pipeline(pipeline);
         pass.set_bind_group(0, self.pixel, &[]);
         pass.set_bind_group(1, lists, &[]);
-        pass.dispatch_workgroups(blocks.x, blocks.y, 1);
+        pass.dispatch_workgroups(groups.x, groups.y, 1);
     }
 }

@@ -1,7 +1,7 @@
 //! WGSL files with imports and definitions.
 //!
 //! In: a file, the libraries that it may import, definitions. Out: one text of WGSL without directives, for every driver and every browser; an
-//! error for a directive that is not understood. A file uses the directives of naga_oil, with which Bevy composes the same libraries:
+//! error for a directive that is not understood. A file uses directives of naga_oil, with which an app can compose the same libraries:
 //!
 //! | directive | meaning |
 //! |---|---|
@@ -35,41 +35,31 @@ pub(super) fn composed<'a>(
             let mut words = line.split_whitespace();
             let [first, second, third] = [(); 3].map(|()| words.next().unwrap_or_default());
             let refused = || Err(format!("the line `{line}` is not understood"));
-            let is_defined = |name: &str| definitions.contains(&name);
             let is_part = branches.iter().all(|(here, _)| *here);
             match (first, branches.last_mut()) {
-                ("#ifdef", _) => branches.push((is_defined(second), is_defined(second))),
-                ("#ifndef", _) => branches.push((!is_defined(second), !is_defined(second))),
+                ("#ifdef" | "#ifndef", _) => {
+                    let holds = holds(&first[1..], second, definitions) == Some(true);
+                    branches.push((holds, holds));
+                }
                 ("#else", Some((here, any))) => {
-                    let holds = match second {
-                        "" => true,
-                        "ifdef" => is_defined(third),
-                        "ifndef" => !is_defined(third),
-                        _ => return refused(),
-                    };
+                    let Some(holds) = holds(second, third, definitions) else { return refused() };
                     *here = holds && !*any;
                     *any |= holds;
                 }
-                ("#endif", Some(_)) => {
-                    branches.pop();
-                }
+                ("#endif", Some(_)) => _ = branches.pop(),
                 ("#else" | "#endif", None) => return refused(),
                 ("#define_import_path", _) => {}
                 _ if !is_part => {}
                 ("#import", _) => {
                     let name = second.strip_prefix("gs4d::").and_then(|path| path.split("::").next());
-                    let Some(library) = libraries.clone().find(|(known, _)| Some(*known) == name) else {
-                        return refused();
-                    };
+                    let library = libraries.clone().find(|(known, _)| Some(*known) == name);
+                    let Some(library) = library else { return refused() };
                     if files.iter().all(|(known, _)| *known != library.0) {
                         files.push(*library);
                     }
                 }
                 _ if first.starts_with('#') => return refused(),
-                _ => {
-                    text.push_str(line);
-                    text.push('\n');
-                }
+                _ => text.extend([line, "\n"]),
             }
         }
         if !branches.is_empty() {
@@ -77,6 +67,16 @@ pub(super) fn composed<'a>(
         }
     }
     Ok(text)
+}
+
+/// Returns whether a condition holds: `ifdef` or `ifndef` with a name, or none; `None` for any other condition.
+fn holds(condition: &str, name: &str, definitions: &[&str]) -> Option<bool> {
+    match condition {
+        "" => Some(true),
+        "ifdef" => Some(definitions.contains(&name)),
+        "ifndef" => Some(!definitions.contains(&name)),
+        _ => None,
+    }
 }
 
 #[cfg(test)]

@@ -122,5 +122,5 @@ fn scenes_with_environment_map_or_without_gaussians_have_no_levels() {
     assert!(matches!(refused, Err(OfflineError::Surrounded)), "a scene with an environment map is refused");
     let nothing = RuntimeScene::sliced(Vec::new(), Harmonics::default());
     let refused = detail(&mut headless, nothing.into(), &QUICK, &mut NoProgress);
-    assert!(matches!(refused, Err(OfflineError::NothingToOrbit)), "a scene without Gaussians is refused");
+    assert!(matches!(refused, Err(OfflineError::NothingDrawn)), "a scene without Gaussians is refused");
 }

@@ -5,12 +5,13 @@
 
 use crate::support::skip::skip;
 use crate::support::{golden, gpu};
-use bevy_gs4d::gaussian::{GradientMode, Harmonics, Parameters};
+use bevy_gs4d::gaussian::{GradientMode, Harmonics, Parameters, SliceSettings};
 use bevy_gs4d::internal::gaussian::ParameterGradient;
 use bevy_gs4d::internal::offline::fine_tune::{
-    Exposure, GpuImage, IDENTITY, Moments, NEIGHBORS, Sample, Trainer, adam, center, environment_backward, exposed,
-    exposure_backward, loss, neighbors, opacity_mask, pull, regularization,
+    Exposure, GpuImage, IDENTITY, Moments, NEIGHBORS, STEPS_IN_FLIGHT, Sample, Trainer, adam, center,
+    environment_backward, exposed, exposure_backward, loss, neighbors, opacity_mask, pull, regularization,
 };
+use bevy_gs4d::internal::reference::{PixelGradients, gradients};
 use bevy_gs4d::internal::scene::packed::encode::Bits;
 use bevy_gs4d::offline::dataset::CoveredImage;
 use bevy_gs4d::offline::fine_tune::{GradientSums, Rates, Terms};
@@ -22,6 +23,8 @@ use bevy_gs4d::scene::{Environment, GaussianScene, SceneForm, Trained};
 use bevy_gs4d::view::{Background, Camera, Frame, Picture, RasterFov, View};
 use glam::{UVec2, Vec3};
 use serde_json::{Value, json};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Returns the tensors of a scene or its gradients, each as one list, by name.
 fn tensors(parameters: &Parameters, harmonics: &Harmonics) -> Vec<(&'static str, Vec<f32>)> {
@@ -300,6 +303,46 @@ fn covered(frame: &Frame, coverage: u8) -> CoveredImage {
 }
 
 #[test]
+fn gradients_through_the_filter_of_mip_splatting_match_the_cpu_reference() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let Lesson { mut scene, views, .. } = Lesson::new(&mut headless);
+    scene.trained_with.mip_filter = true;
+    let SceneForm::Trained(Trained { parameters, .. }) = &mut scene.form else { panic!("the trained form") };
+    // Splats of about a pixel, of which the filter changes the opacity most.
+    parameters.log_scale.as_flattened_mut().iter_mut().for_each(|scale| *scale -= 1.0);
+    let runtime = scene.clone().into_runtime().expect("the scene can be drawn");
+    let background = Background::Color(BEHIND);
+    let count = views[0].size.element_product() as usize;
+    let weight = |i: usize, seed: usize| ((i * seed) % 61) as f32 / 61.0 - 0.3;
+    let pixels: Vec<[f32; 4]> = (0..count).map(|i| [7, 11, 13, 17].map(|seed| weight(i, seed))).collect();
+    let color: Vec<Vec3> = pixels.iter().map(|&[r, g, b, _]| Vec3::new(r, g, b)).collect();
+    let (depth, alpha) = (vec![0.0; count], pixels.iter().map(|pixel| pixel[3]).collect::<Vec<f32>>());
+    let pixel_gradients = PixelGradients { color: &color, depth: &depth, alpha: &alpha };
+    let expected = |view: &View| {
+        let (trained, slice) = (trained(&scene), SliceSettings::default());
+        let mode = GradientMode::Exact;
+        as_parameters(&gradients(trained, &slice, &runtime, view, background, &pixel_gradients, mode))
+    };
+    let plain = views[0];
+    let filtered = plain.with_optics(scene.trained_with.optics());
+    let mut trainer = Trainer::new(&mut headless, scene.clone(), GradientMode::Exact).expect("it can be trained");
+    trainer.accumulate_pixels(&filtered, background, &pixels, &depth).expect("the picture fits");
+    let found = trainer.gradients().expect("gradients can be read");
+    let none = Harmonics::default();
+    let found = tensors(&trained(&found).parameters, &none);
+    let [own, other] = [filtered, plain].map(|view| tensors(&expected(&view), &none));
+    // Color is compared elsewhere.
+    let geometry = found.iter().zip(&own).zip(&other).take(7);
+    for (((name, found), (_, own)), (_, other)) in geometry {
+        let [error, without] = [own, other].map(|expected| relative_error(found, expected));
+        println!("{name:14} {error:.1e}, without the filter {without:.1e}");
+        assert!(error < 1e-2, "{name} differs by {error:.1e}");
+        assert!(without > 5e-2, "{name}: the filter changes the gradient: {without:.1e}");
+    }
+    assert_eq!(trainer.faults().expect("faults can be read"), None, "every gradient is finite");
+}
+
+#[test]
 fn the_loss_and_its_gradient_match_the_cpu_reference() {
     let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new(&mut headless);
@@ -376,6 +419,63 @@ fn atomic_sums_match_sums_in_a_fixed_order() {
     }
 }
 
+#[test]
+fn gradients_of_batches_add_up_and_each_view_has_its_share_of_its_batch() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let lesson = Lesson::new(&mut headless);
+    let mut gradients = |batches: &[&[usize]]| {
+        let mut trainer =
+            Trainer::new(&mut headless, lesson.disturbed(), GradientMode::Exact).expect("the scene can be trained");
+        let images = lesson.upload(&trainer);
+        for batch in batches {
+            let samples: Vec<Sample<'_>> = batch.iter().map(|&index| lesson.sample(&images, index)).collect();
+            trainer.accumulate(&samples, 0.2).expect("the views are drawn");
+        }
+        let found = trainer.gradients().expect("gradients can be read");
+        tensors(&trained(&found).parameters, &trained(&found).harmonics)
+    };
+    let whole = gradients(&[&[0, 1, 2, 3, 4, 5]]);
+    // The optimizer hides a factor on all gradients, so the gradients themselves are compared.
+    let divided: [(&[&[usize]], f32); 3] = [
+        (&[&[0, 1, 2], &[3, 4, 5]], 2.0),
+        (&[&[0, 1], &[2, 3], &[4, 5]], 3.0),
+        (&[&[0], &[1], &[2], &[3], &[4], &[5]], 6.0),
+    ];
+    for (batches, factor) in divided {
+        for ((name, found), (_, whole)) in gradients(batches).iter().zip(&whole) {
+            let expected: Vec<f32> = whole.iter().map(|value| factor * value).collect();
+            let error = relative_error(found, &expected);
+            assert!(whole.iter().any(|&value| value != 0.0), "{name} has a gradient");
+            assert!(error < 1e-4, "{batches:?}: {name} differs by {error:.1e} from {factor} times that of one batch");
+        }
+    }
+}
+
+#[test]
+fn no_more_steps_are_in_flight_than_their_bound() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let scene = Lesson::new(&mut headless).disturbed();
+    // A picture that takes a software driver longer than the host takes to record a step.
+    let camera = Camera::look_at(Vec3::new(2.4, 0.0, 1.2), Vec3::ZERO, Vec3::Z, 0.8, UVec2::new(320, 240));
+    let (view, background) = (camera.view(0.5, RasterFov::Reference), Background::Color(BEHIND));
+    let mut trainer = Trainer::new(&mut headless, scene, GradientMode::Exact).expect("the scene can be trained");
+    let image = covered(&trainer.draw(&view, background).expect("the view is drawn"), 255);
+    let image = trainer.upload(&image).expect("the image fits the GPU");
+    let finished = Arc::new(AtomicUsize::new(0));
+    for step in 1..=3 * STEPS_IN_FLIGHT {
+        let sample = Sample { view: &view, image: &image, background, number: 0 };
+        trainer.accumulate(&[sample], 0.2).expect("the view is drawn");
+        trainer.step(&Rates::OURS, 1.0, step).expect("the step succeeds");
+        // The end of the step for which this one has waited has been reported.
+        let in_flight = step - finished.load(Ordering::Relaxed);
+        assert!(in_flight <= STEPS_IN_FLIGHT, "step {step}: {in_flight} steps are in flight");
+        let finished = finished.clone();
+        trainer.headless().context().queue.on_submitted_work_done(move || {
+            finished.fetch_add(1, Ordering::Relaxed);
+        });
+    }
+}
+
 /// Returns gradients as parameters, in single precision.
 fn as_parameters(gradients: &[ParameterGradient]) -> Parameters {
     fn each<T>(gradients: &[ParameterGradient], value: impl Fn(&ParameterGradient) -> T) -> Vec<T> {
@@ -416,7 +516,7 @@ fn the_gradients_of_terms_match_the_cpu_reference() {
         trainer.set_terms(terms).expect("the weights are right");
         trainer.accumulate_terms(0).expect("the terms are added");
         let found = trainer.gradients().expect("gradients can be read");
-        let expected = regularization(parameters, &near, &terms).expect("the Gaussians can be drawn").gradients;
+        let expected = regularization(parameters, &near, &terms, 1.0).expect("the Gaussians can be drawn").gradients;
         let none = Harmonics { values: vec![0.0; harmonics.values.len()], ..harmonics.clone() };
         let expected = tensors(&as_parameters(&expected), &none);
         let moves = expected.iter().filter(|(_, values)| values.iter().any(|&value| value != 0.0)).count();
@@ -444,7 +544,7 @@ fn fifty_steps_lower_each_term() {
             let scene = trainer.scene().expect("the scene can be read");
             let parameters = &trained(&scene).parameters;
             let found =
-                regularization(parameters, &neighbors(&parameters.mean), &terms).expect("the Gaussians can be drawn");
+                regularization(parameters, &neighbors(&parameters.mean), &terms, 1.0).expect("they can be drawn");
             terms.motion * found.motion + terms.rigid * found.rigid + terms.opacity * found.opacity
         };
         let before = value(&trainer);

@@ -153,7 +153,7 @@ fn mirrors() -> [Mirror; 21] {
         mirror!(ExposureUniforms { background, size, tiles, share, pull, camera, padding }),
         mirror!(TiedColors { count, stride, stages, padding }),
         mirror!(AdamUniforms { rates, correction, count, stride, sparse, values, first, padding }),
-        mirror!(TermWeights { motion, rigid, opacity, scale }),
+        mirror!(TermWeights { motion, rigid, opacity, scale, falloff }),
         mirror!(NoiseUniforms { count, seed, strength, least_log_scale_t }),
         mirror!(DropoutUniforms { count, seed, below, first }),
         mirror!(RelocationUniforms { moves, stride, keeps, first, count }),

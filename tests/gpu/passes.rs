@@ -361,8 +361,9 @@ fn project_matches_the_cpu_reference() {
         stride: 3 * 48 / 4,
         time_span: scene.trained_with.time_span(),
         marginal_cutoff: scene.trained_with.marginal_cutoff,
-        ..InstanceUniforms::new(&view, &Appearance::default(), BlendSpace::Encoded, DebugView::Color)
+        ..Zeroable::zeroed()
     };
+    let instance = instance.in_view(&view, &Appearance::default(), BlendSpace::Encoded, DebugView::Color);
     let record = |gaussian: Gaussian| Gaussian { sigma_t: gaussian.sigma_t.recip(), ..gaussian };
     let slots = (first_slot + count) as usize;
     let buffers = [

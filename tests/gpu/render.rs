@@ -46,6 +46,17 @@ fn swollen(count: usize, factor: f32) -> RuntimeScene {
     scene
 }
 
+/// Returns the same scene at another scale.
+fn scaled(count: usize, scale: f32) -> RuntimeScene {
+    let mut scene = scene(count);
+    for gaussian in &mut scene.form.as_sliced_mut().expect("sliced").gaussians {
+        gaussian.mean = gaussian.mean.map(|value| value * scale);
+        gaussian.velocity = gaussian.velocity.map(|value| value * scale);
+        gaussian.covariance = gaussian.covariance.map(|entry| entry * scale * scale);
+    }
+    scene
+}
+
 /// Returns a scene of a range of the Gaussians of another scene.
 fn part(scene: &RuntimeScene, range: Range<usize>) -> RuntimeScene {
     let mut part = scene.clone();
@@ -287,6 +298,27 @@ fn the_cutoff_of_the_scene_decides_which_tails_are_drawn() {
         visible.push(expected.counts.visible);
     }
     assert!(visible[0] > visible[1] && visible[1] > visible[2], "a lower cut-off shows more tails: {visible:?}");
+}
+
+#[test]
+fn a_small_scene_with_a_near_limit_and_the_filter_of_mip_splatting_matches_the_cpu_reference() {
+    let Some(mut headless) = gpu::headless() else { return };
+    const SCALE: f32 = 0.01;
+    let mut scene = scaled(3_000, SCALE);
+    (scene.trained_with.near, scene.trained_with.mip_filter) = (0.002, true);
+    let camera = Camera::look_at(EYE * SCALE, Vec3::new(0.0, 0.0, 0.2) * SCALE, Vec3::Z, 0.8, SIZE);
+    let view = camera.view(0.37, scene.trained_with.optics());
+    let capture = headless.upload(&scene).expect("upload");
+    let frame = headless.render(&capture, &view, BACKGROUND).expect("render");
+    assert_equivalent(&frame, &expected_frame(&[(&scene, view)], f32::INFINITY), "a small scene");
+    assert!(frame.counts.visible > 500, "the scene is seen: {} splats", frame.counts.visible);
+    let unfiltered = View { trained_pixel: f32::INFINITY, ..view };
+    let dense = headless.render(&capture, &unfiltered, BACKGROUND).expect("render").transmittance;
+    let left = |transmittance: &[f32]| transmittance.iter().sum::<f32>() / transmittance.len() as f32;
+    let [filtered, dense] = [left(&frame.transmittance), left(&dense)];
+    assert!(filtered > dense + 1e-3, "the filter reduces opacity: {filtered} of the background is left, else {dense}");
+    let original = headless.render(&capture, &camera.view(0.37, RasterFov::default()), BACKGROUND).expect("render");
+    assert_eq!(original.counts.visible, 0, "the near limit of the original hides everything");
 }
 
 #[test]

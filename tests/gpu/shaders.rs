@@ -4,7 +4,7 @@
 //! with optional capabilities need these capabilities.
 
 use crate::support::composed::{compose, pass_names};
-use bevy_gs4d::internal::offline::shaders::{ATOMIC_SUMS, COMPAT, COMPAT_WITHOUT_TIME};
+use bevy_gs4d::internal::offline::shaders::{ATOMIC_SUMS, COMPAT, COMPAT_WITHOUT_TIME, MIP_FILTER};
 use bevy_gs4d::internal::renderer::global_sort::AtOnce;
 use bevy_gs4d::internal::renderer::shaders::{BINNED, COPIED_INSTANCE, MULTISAMPLED, SHADERS, SUBGROUPS_OF_32};
 use bevy_gs4d::internal::renderer::tile_bins::{
@@ -83,7 +83,7 @@ fn every_pass_composes_and_is_valid() {
         .into_iter()
         .chain(at_once)
         .chain([MULTISAMPLED.to_vec(), COMPAT.to_vec(), COMPAT_WITHOUT_TIME.to_vec()])
-        .chain([ATOMIC_SUMS.to_vec(), [COMPAT, ATOMIC_SUMS].concat()])
+        .chain([ATOMIC_SUMS.to_vec(), [COMPAT, ATOMIC_SUMS].concat(), MIP_FILTER.to_vec()])
         .chain(binned)
         .chain(copied)
         .chain(blending)

@@ -319,7 +319,8 @@ fn the_gradient_of_the_term_of_scale_matches_the_cpu_reference() {
     let scene = synthetic();
     let terms = Terms { scale: 0.7, ..Terms::default() };
     let parameters = &trained(&scene).parameters;
-    let expected = regularization(parameters, &neighbors(&parameters.mean), &terms).expect("the Gaussians are drawn");
+    let expected =
+        regularization(parameters, &neighbors(&parameters.mean), &terms, 1.0).expect("the Gaussians are drawn");
     let mut trainer = Trainer::new(&mut headless, scene.clone(), GradientMode::Exact).expect("the scene is trained");
     trainer.set_terms(terms).expect("the weight is right");
     trainer.accumulate_terms(0).expect("the term is added");

@@ -6,7 +6,7 @@
 use crate::gaussian::Gaussian;
 use crate::renderer::memory::Allocator;
 use crate::scene::packed::{BLOCK, BLOCK_RANGES, COLOR_WORDS, RECORD_WORDS, SHARED_RANGES};
-use crate::scene::{ActiveSets, CodedColors, Environment, Form, PackedColors, RuntimeScene, TemporalFilter};
+use crate::scene::{ActiveSets, CodedColors, Environment, Form, RuntimeScene, TemporalFilter};
 use std::ops::Range;
 
 /// Largest number of bytes that are converted and written at once. It limits the memory of converted records on the host.
@@ -53,17 +53,11 @@ enum Content {
 /// Returns the bytes of one Gaussian in the largest buffer. `stride` is the number of four-vectors per Gaussian if coefficients are stored
 /// whole.
 pub(super) fn largest_record(form: &Form, stride: usize) -> u64 {
-    let whole = stride * size_of::<[f32; 4]>();
-    let (geometry, color) = match form {
-        Form::Sliced(_) => (size_of::<Gaussian>(), whole),
-        Form::Packed(packed) => {
-            let color = match &packed.colors {
-                PackedColors::Whole(_) => whole,
-                PackedColors::Coded(_) => size_of::<[u32; COLOR_WORDS]>(),
-            };
-            (size_of::<[u32; RECORD_WORDS]>(), color)
-        }
+    let geometry = match form {
+        Form::Sliced(_) => size_of::<Gaussian>(),
+        Form::Packed(_) => size_of::<[u32; RECORD_WORDS]>(),
     };
+    let color = form.coded_colors().map_or(stride * size_of::<[f32; 4]>(), |_| size_of::<[u32; COLOR_WORDS]>());
     geometry.max(color) as u64
 }
 
@@ -232,16 +226,7 @@ impl Filling {
                 });
             }
             Content::ColorRecords => to.copy_from_slice(bytemuck::cast_slice(&form.coded_colors()?.records[own])),
-            Content::Codebooks => {
-                let entries = form.coded_colors()?.all_entries().skip(records.start);
-                for ((words, scales), record) in entries.zip(to.chunks_exact_mut(size)) {
-                    let halves = words.iter().zip(scales).flat_map(|(&word, scale)| CodedColors::values(word, scale));
-                    for (index, half) in halves.enumerate() {
-                        let at = 2 * place_in_entry(index, size / 4);
-                        record[at..at + 2].copy_from_slice(&half.to_ne_bytes());
-                    }
-                }
-            }
+            Content::Codebooks => convert_entries(form.coded_colors()?, records.start, size, to),
             Content::Filter => self.convert_filter(scene.filter.as_ref()?, records, to),
             Content::Environment => {
                 to.copy_from_slice(bytemuck::cast_slice(&scene.environment.as_ref()?.texels[records]));
@@ -263,6 +248,17 @@ impl Filling {
                 let own = self.own.start + records.start..self.own.start + records.end;
                 to.copy_from_slice(bytemuck::cast_slice(&intervals[own]));
             }
+        }
+    }
+}
+
+/// Converts entries of the codebooks, from the entry `first` on, of `size` bytes each.
+fn convert_entries(colors: &CodedColors, first: usize, size: usize, to: &mut [u8]) {
+    for ((words, scales), record) in colors.all_entries().skip(first).zip(to.chunks_exact_mut(size)) {
+        let halves = words.iter().zip(scales).flat_map(|(&word, scale)| CodedColors::values(word, scale));
+        for (index, half) in halves.enumerate() {
+            let at = 2 * place_in_entry(index, size / 4);
+            record[at..at + 2].copy_from_slice(&half.to_ne_bytes());
         }
     }
 }

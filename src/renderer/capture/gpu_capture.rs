@@ -8,7 +8,7 @@ use super::buffers::{self, Filling};
 use crate::gaussian::ShDirection;
 use crate::gaussian::harmonics::evaluated;
 use crate::renderer::error::GpuError;
-use crate::renderer::layout::{self, BLOCK};
+use crate::renderer::layout::{self, BLOCK, InstanceUniforms};
 use crate::renderer::memory::{Allocator, binding_limit};
 use crate::renderer::pipelines::Renderer;
 use crate::renderer::shaders::Storage;
@@ -33,8 +33,8 @@ pub struct GpuCapture {
     bytes: u64,
     /// The box around its Gaussians at all times, in capture space, if it is known. It changes no picture.
     pub(crate) bounds: Option<Bounds>,
-    /// Color and time settings of the [`layout::InstanceUniforms`]; the rest is zero.
-    settings: layout::InstanceUniforms,
+    /// Color and time settings of the uniforms of an instance; the rest is zero.
+    pub(in crate::renderer) settings: InstanceUniforms,
     len: usize,
 }
 
@@ -112,32 +112,17 @@ impl GpuCapture {
         scene: &RuntimeScene,
     ) -> Result<(Self, Vec<Filling>), GpuError> {
         scene.check().map_err(GpuError::Scene)?;
-        let allocator = renderer.allocator(device);
-        let form = &scene.form;
-        let storage = Storage::of(form);
+        let (allocator, form) = (renderer.allocator(device), &scene.form);
         let ColorDegrees { degree, degree_t, .. } = form.color_degrees();
         let stride = (evaluated(degree, degree_t) * 3).div_ceil(4);
-        let limits = device.limits();
-        if let Some(map) = &scene.environment {
-            let (needed, limit) = (size_of_val(map.texels.as_slice()) as u64, binding_limit(&limits));
-            if needed > limit {
-                return Err(GpuError::TooLarge { what: "the environment map", needed, limit });
-            }
-        }
-        let bits = scene.filter.as_ref().map_or(0, |filter| match filter.sets {
-            ActiveSets::Bits(_) => u64::from(filter.segments).div_ceil(8),
-            ActiveSets::Intervals(_) => 4,
-        });
-        let record = buffers::largest_record(form, stride).max(bits);
-        let threads = u64::from(limits.max_compute_workgroups_per_dimension) * 256;
-        // A multiple of the block that one workgroup of `activate` processes.
-        let per_part = ((binding_limit(&limits) / record).min(threads) as usize / BLOCK as usize) * BLOCK as usize;
-        if per_part == 0 {
-            let (needed, limit) = (record * u64::from(BLOCK), binding_limit(&limits));
-            return Err(GpuError::TooLarge { what: "the Gaussians", needed, limit });
-        }
-        let mut parts = Vec::new();
-        let mut fillings = Vec::new();
+        let per_part = per_part(&device.limits(), scene, stride)?;
+        let storage = Storage::of(form);
+        let [of_geometry, of_color] = &renderer.layouts.captures[storage as usize];
+        let group = |layout: &wgpu::BindGroupLayout, buffers: &[wgpu::Buffer]| {
+            let resources: Vec<_> = buffers.iter().map(wgpu::Buffer::as_entire_binding).collect();
+            allocator.bind_group("gs4d capture", layout, &resources)
+        };
+        let (mut parts, mut fillings) = (Vec::new(), Vec::new());
         let codebooks = form.coded_colors().map(|colors| buffers::codebooks(allocator, colors));
         for first in (0..scene.len()).step_by(per_part) {
             let own = first..(first + per_part).min(scene.len());
@@ -146,12 +131,14 @@ impl GpuCapture {
             let buffer = |filling: &Filling| filling.buffer.clone();
             let colors = [&color].into_iter().chain(&codebooks).map(buffer).collect();
             let both: [Vec<wgpu::Buffer>; 2] = [geometry.iter().map(buffer).collect(), colors];
-            let [geometry_group, color_group] =
-                renderer.capture_bind_groups(device, storage, both.each_ref().map(|all| &all[..]));
-            fillings.extend(geometry);
-            fillings.push(color);
-            let (count, buffers) = (own.len() as u32, both.concat());
-            parts.push(Part { count, geometry: geometry_group, color: color_group, buffers, filter: None });
+            parts.push(Part {
+                count: own.len() as u32,
+                geometry: group(of_geometry, &both[0]),
+                color: group(of_color, &both[1]),
+                buffers: both.concat(),
+                filter: None,
+            });
+            fillings.extend(geometry.into_iter().chain([color]));
         }
         fillings.extend(codebooks);
         let environment = scene.environment.as_ref().map(|map| {
@@ -161,18 +148,7 @@ impl GpuCapture {
             EnvironmentBuffer { buffer, size: [map.width, map.height] }
         });
         let bytes = fillings.iter().map(|filling| filling.buffer.size()).sum();
-        let settings = layout::InstanceUniforms {
-            degree,
-            degree_t: if degree == 3 { degree_t } else { 0 },
-            stride: form.coded_colors().map_or(stride, buffers::entry_words) as u32,
-            stages: form.coded_colors().map_or(0, |colors| colors.entries.len() as u32),
-            first_entries: form.coded_colors().map(first_entries).unwrap_or_default(),
-            displaced: u32::from(scene.trained_with.sh_direction == ShDirection::Displaced),
-            time_span: scene.trained_with.time_span(),
-            marginal_cutoff: scene.trained_with.marginal_cutoff,
-            ..bytemuck::Zeroable::zeroed()
-        };
-        let id = NEXT_ID.fetch_add(1, Ordering::Relaxed);
+        let (settings, id) = (settings(scene, stride), NEXT_ID.fetch_add(1, Ordering::Relaxed));
         let mut capture =
             Self { parts, environment, storage, id, filter: None, bytes, bounds: None, settings, len: scene.len() };
         if let Some(filter) = &scene.filter {
@@ -272,30 +248,51 @@ impl GpuCapture {
         self.parts.iter().map(|part| &part.geometry)
     }
 
-    /// Returns `view` with the color and time settings of the capture.
-    pub(in crate::renderer) fn instance(&self, view: &layout::InstanceUniforms) -> layout::InstanceUniforms {
-        layout::InstanceUniforms {
-            degree: self.settings.degree,
-            degree_t: self.settings.degree_t,
-            stride: self.settings.stride,
-            displaced: self.settings.displaced,
-            stages: self.settings.stages,
-            first_entries: self.settings.first_entries,
-            time_span: self.settings.time_span,
-            marginal_cutoff: self.settings.marginal_cutoff,
-            middle: self.middle(view.camera_z),
-            ..*view
-        }
-    }
-
     /// Returns the depth of the center of the bounds; `f32::MIN` if they are not known. `row` is row z of capture-to-camera.
-    fn middle(&self, row: [f32; 4]) -> f32 {
+    pub(in crate::renderer) fn middle(&self, row: [f32; 4]) -> f32 {
         let depth = |bounds: Bounds| Vec4::from(row).dot(bounds.center().extend(1.0));
         self.bounds.map(depth).filter(|depth| depth.is_finite()).unwrap_or(f32::MIN)
     }
 }
 
 static NEXT_ID: AtomicU64 = AtomicU64::new(0);
+
+/// Returns the number of Gaussians of each part but the last: a multiple of the block that one workgroup of `activate` processes. `stride` is the
+/// number of four-vectors of color coefficients per Gaussian.
+fn per_part(limits: &wgpu::Limits, scene: &RuntimeScene, stride: usize) -> Result<usize, GpuError> {
+    let limit = binding_limit(limits);
+    let map = scene.environment.as_ref().map_or(0, |map| size_of_val(map.texels.as_slice()) as u64);
+    if map > limit {
+        return Err(GpuError::TooLarge { what: "the environment map", needed: map, limit });
+    }
+    let bits = scene.filter.as_ref().map_or(0, |filter| match filter.sets {
+        ActiveSets::Bits(_) => u64::from(filter.segments).div_ceil(8),
+        ActiveSets::Intervals(_) => 4,
+    });
+    let record = buffers::largest_record(&scene.form, stride).max(bits);
+    let threads = u64::from(limits.max_compute_workgroups_per_dimension) * 256;
+    match (limit / record).min(threads) as usize / BLOCK as usize {
+        0 => Err(GpuError::TooLarge { what: "the Gaussians", needed: record * u64::from(BLOCK), limit }),
+        blocks => Ok(blocks * BLOCK as usize),
+    }
+}
+
+/// Returns the color and time settings of a scene as uniforms, with zero in place of all others.
+fn settings(scene: &RuntimeScene, stride: usize) -> InstanceUniforms {
+    let (trained_with, colors) = (&scene.trained_with, scene.form.coded_colors());
+    let ColorDegrees { degree, degree_t, .. } = scene.form.color_degrees();
+    InstanceUniforms {
+        degree,
+        degree_t: if degree == 3 { degree_t } else { 0 },
+        stride: colors.map_or(stride, buffers::entry_words) as u32,
+        stages: colors.map_or(0, |colors| colors.entries.len() as u32),
+        first_entries: colors.map(first_entries).unwrap_or_default(),
+        displaced: u32::from(trained_with.sh_direction == ShDirection::Displaced),
+        time_span: trained_with.time_span(),
+        marginal_cutoff: trained_with.marginal_cutoff,
+        ..bytemuck::Zeroable::zeroed()
+    }
+}
 
 /// Returns the index of the first entry of each codebook among all entries.
 fn first_entries(colors: &CodedColors) -> [u32; MAX_STAGES] {

@@ -23,7 +23,7 @@ impl AtOnce {
     pub const ALL: [Self; 3] = [Self::One, Self::Sixteen, Self::SixtyFour];
 
     /// Returns the number of splats.
-    pub(in crate::renderer) fn splats(self) -> u32 {
+    fn splats(self) -> u32 {
         match self {
             Self::One => 1,
             Self::Sixteen => 16,
@@ -52,7 +52,7 @@ fn of_blend(slots: u64, at_once: AtOnce) -> u64 {
 }
 
 /// Returns the variant of `blend` that draws this number of slots completely: the smallest one. `None` if there are too many slots.
-pub(in crate::renderer) fn at_once(slots: usize) -> Option<AtOnce> {
+pub(super) fn at_once(slots: usize) -> Option<AtOnce> {
     AtOnce::ALL.into_iter().find(|&at_once| of_blend(slots as u64, at_once) <= MOST_ITERATIONS)
 }
 

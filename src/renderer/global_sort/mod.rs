@@ -13,9 +13,6 @@
 //!
 //! Two stable sorts, first by depth and then by tile, produce the original's order by (tile, depth, index), and move far
 //! less data than a sort by 64-bit keys. No pass needs subgroups, and the results do not depend on the subgroup size.
-//!
-//! If a frame has more pairs than the buffers can hold, the pairs of the farthest splats are not written: at the end of its list, `blend`
-//! continues with all remaining splats in depth order.
 
 mod at_once;
 mod buffers;
@@ -23,14 +20,10 @@ mod finished;
 mod layouts;
 mod passes;
 mod record;
+mod view;
 
 pub use at_once::AtOnce;
-pub(super) use at_once::at_once;
-pub(super) use buffers::SortBuffers;
 pub use finished::{FinishedFrame, PassBuffers};
 pub(super) use layouts::SortLayouts;
 pub(super) use passes::SortPasses;
-
-/// Names of the timed passes of a frame, in order. The last two are the passes of motions.
-pub(super) const TIMED_PASSES: &[&str] =
-    &["project", "sort (depth)", "bin", "sort (tile)", "ranges", "blend", "motion", "blend (motion)"];
+pub(super) use view::GlobalSort;

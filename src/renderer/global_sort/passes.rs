@@ -23,14 +23,10 @@ pub(in crate::renderer) struct SortPasses {
 /// The passes between `project` and `blend`.
 #[derive(Debug)]
 pub(super) struct StepPasses {
-    pub sort_count: wgpu::ComputePipeline,
-    pub sort_scan: wgpu::ComputePipeline,
-    pub sort_visible: wgpu::ComputePipeline,
-    pub sort_scatter: wgpu::ComputePipeline,
-    pub bin_count: wgpu::ComputePipeline,
-    pub bin_scan: wgpu::ComputePipeline,
-    pub bin_offset: wgpu::ComputePipeline,
-    pub bin_emit: wgpu::ComputePipeline,
+    /// `count`, `scan`, `visible`, `scatter`.
+    pub sort: [wgpu::ComputePipeline; 4],
+    /// `count`, `scan`, `offset`, `emit`.
+    pub bin: [wgpu::ComputePipeline; 4],
     pub ranges: wgpu::ComputePipeline,
 }
 
@@ -38,23 +34,14 @@ impl StepPasses {
     fn new(device: &wgpu::Device, compiler: &Compiler) -> Result<Self, GpuError> {
         let layouts = &compiler.layouts.global_sort;
         let (sort, bin, arguments) = (&layouts.sort, &layouts.bin, &layouts.arguments);
-        let entries: [(_, &[_]); 4] =
+        let of_sort: [(_, &[_]); 4] =
             [("count", &[sort]), ("scan", &[sort]), ("visible", &[sort, arguments]), ("scatter", &[sort])];
-        let [sort_count, sort_scan, sort_visible, sort_scatter] = pipelines(device, compiler, "sort", entries)?;
-        let entries: [(_, &[_]); 4] =
+        let of_bin: [(_, &[_]); 4] =
             [("count", &[bin]), ("scan", &[bin, arguments]), ("offset", &[bin]), ("emit", &[bin])];
-        let [bin_count, bin_scan, bin_offset, bin_emit] = pipelines(device, compiler, "bin", entries)?;
-        let ranges = compiler.pass(device, "ranges", &[], &[Some(&layouts.ranges)])?;
         Ok(Self {
-            sort_count,
-            sort_scan,
-            sort_visible,
-            sort_scatter,
-            bin_count,
-            bin_scan,
-            bin_offset,
-            bin_emit,
-            ranges,
+            sort: pipelines(device, compiler, "sort", of_sort)?,
+            bin: pipelines(device, compiler, "bin", of_bin)?,
+            ranges: compiler.pass(device, "ranges", &[], &[Some(&layouts.ranges)])?,
         })
     }
 }

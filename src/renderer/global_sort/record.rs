@@ -11,18 +11,17 @@ use crate::renderer::shaders::Pixels;
 use crate::view::tiles;
 
 impl SortBuffers {
-    /// Records the passes of a frame with so many slots.
-    pub(in crate::renderer) fn record(
+    /// Records the passes of a frame.
+    pub(super) fn record(
         &self,
         frame: &Recording<'_>,
         pass: &mut wgpu::ComputePass<'_>,
-        slots: u32,
         pixels: Pixels,
         at_once: AtOnce,
-    ) {
+    ) -> Option<()> {
         // project
         let passes = &frame.renderer.passes.global_sort;
-        let (Some(steps), Some(blend)) = (passes.steps(), passes.blend(pixels, at_once)) else { return };
+        let (steps, blend) = (passes.steps()?, passes.blend(pixels, at_once)?);
         let pipeline = |storage, batched| passes.project(storage, batched);
         frame.dispatch_parts(pass, pipeline, &self.project, |_, count| count.div_ceil(256));
         frame.mark(pass);
@@ -31,22 +30,12 @@ impl SortBuffers {
         // by this count.
         for step in 0..DEPTH_STEPS {
             let group = &self.sort_depth[if step == 0 { 0 } else { 2 - (step as usize % 2) }];
-            let blocks = (step == 0).then(|| slots.div_ceil(BLOCK));
+            let blocks = (step == 0).then(|| frame.slots.div_ceil(BLOCK));
             self.sort_step(steps, pass, group, step, blocks, 0);
         }
         frame.mark(pass);
 
-        // bin
-        pass.set_bind_group(0, &self.bin, &[]);
-        pass.set_pipeline(&steps.bin_count);
-        pass.dispatch_workgroups_indirect(&self.arguments, 0);
-        pass.set_pipeline(&steps.bin_scan);
-        pass.set_bind_group(1, &self.write_arguments, &[]);
-        pass.dispatch_workgroups(1, 1, 1);
-        pass.set_pipeline(&steps.bin_offset);
-        pass.dispatch_workgroups_indirect(&self.arguments, 0);
-        pass.set_pipeline(&steps.bin_emit);
-        pass.dispatch_workgroups_indirect(&self.arguments, 12);
+        self.record_bin(steps, pass);
         frame.mark(pass);
 
         // sort by tile
@@ -64,8 +53,24 @@ impl SortBuffers {
         frame.mark(pass);
 
         // blend
-        frame.dispatch_tiles(pass, blend, &self.blend);
+        frame.dispatch_tiles(pass, blend, &self.blend, 1);
         frame.mark(pass);
+        Some(())
+    }
+
+    /// Records `bin`.
+    fn record_bin(&self, steps: &StepPasses, pass: &mut wgpu::ComputePass<'_>) {
+        let [count, scan, offset, emit] = &steps.bin;
+        pass.set_bind_group(0, &self.bin, &[]);
+        pass.set_pipeline(count);
+        pass.dispatch_workgroups_indirect(&self.arguments, 0);
+        pass.set_pipeline(scan);
+        pass.set_bind_group(1, &self.write_arguments, &[]);
+        pass.dispatch_workgroups(1, 1, 1);
+        pass.set_pipeline(offset);
+        pass.dispatch_workgroups_indirect(&self.arguments, 0);
+        pass.set_pipeline(emit);
+        pass.dispatch_workgroups_indirect(&self.arguments, 12);
     }
 
     /// Records one step of `sort`. `blocks` is the number of workgroups; if it is unknown on the host, the dispatch is
@@ -83,17 +88,18 @@ impl SortBuffers {
             Some(blocks) => pass.dispatch_workgroups(blocks, 1, 1),
             None => pass.dispatch_workgroups_indirect(&self.arguments, offset),
         };
+        let [count, scan, visible, scatter] = &steps.sort;
         pass.set_bind_group(0, group, &[step * INSTANCE_STRIDE]);
-        pass.set_pipeline(&steps.sort_count);
+        pass.set_pipeline(count);
         dispatch(pass);
-        pass.set_pipeline(&steps.sort_scan);
+        pass.set_pipeline(scan);
         pass.dispatch_workgroups(DIGITS, 1, 1);
         if step == 0 {
-            pass.set_pipeline(&steps.sort_visible);
+            pass.set_pipeline(visible);
             pass.set_bind_group(1, &self.write_arguments, &[]);
             pass.dispatch_workgroups(1, 1, 1);
         }
-        pass.set_pipeline(&steps.sort_scatter);
+        pass.set_pipeline(scatter);
         dispatch(pass);
     }
 }

@@ -54,12 +54,13 @@ impl Headless {
         }
         let untimed = self.run(&mut lanes, capture, views, frames, None)?;
         let around = self.run(&mut lanes, capture, views, frames, Some(&[]))?;
-        let passes = self.view.design().timed_passes(false);
+        let passes = self.view.timed_passes();
         let inside = self.run(&mut lanes, capture, views, frames, Some(passes))?;
         let mut alone = Vec::new();
         for i in 0..frames {
             let start = Instant::now();
-            self.submit_frame(&mut lanes[0], capture, &views[i % views.len()])?;
+            let commands = self.encode(&mut lanes[0], capture, &views[i % views.len()], None)?;
+            self.context.queue.submit([commands]);
             self.wait()?;
             alone.push(start.elapsed().as_secs_f64() * 1e3);
         }
@@ -140,13 +141,6 @@ impl Headless {
             times.extend(timestamps.chunks_exact(each as usize).map(|frame| timer.intervals(frame)));
         }
         Ok(Run { frames: times, wall_milliseconds, encode_milliseconds: encode / frames.max(1) as f64 })
-    }
-
-    /// Draws one frame in a submit of its own.
-    fn submit_frame(&self, lane: &mut Lane, capture: &GpuCapture, view: &View) -> Result<(), GpuError> {
-        let commands = self.encode(lane, capture, view, None)?;
-        self.context.queue.submit([commands]);
-        Ok(())
     }
 
     /// Records one frame with its own encoder. Its timestamps are copied to the given buffer and offset.

@@ -78,7 +78,8 @@ impl Headless {
     /// # Errors
     /// When a shader does not compile.
     pub fn compile_ahead(&self, storage: Storage) -> Result<(), GpuError> {
-        self.renderer.compile_ahead(&self.context.device, self.design(), storage)
+        let (blending, precision) = Default::default();
+        self.renderer.passes.compile_ahead(&self.context.device, self.design(), storage, blending, precision)
     }
 
     /// Returns the design with which views are drawn, as [`ViewRenderer::design`]: never [`Design::Auto`].
@@ -156,7 +157,7 @@ impl Headless {
             transmittance: color.iter().map(|p| p[3]).collect(),
             depth: depth.iter().map(|p| p[0]).collect(),
             median_depth: depth.iter().map(|p| p[1]).collect(),
-            counts: Counts { visible: counters.visible, pairs: self.view.pair_count(&counters) },
+            counts: Counts { visible: counters.visible, pairs: self.view.design.pair_count(&counters) },
         })
     }
 
@@ -192,7 +193,7 @@ impl Headless {
         let instances = [instance(capture, None, view)];
         loop {
             let counters = self.submit(&instances, &parameters)?;
-            let (pairs, capacity) = (self.view.pair_count(&counters), self.view.pair_capacity());
+            let (pairs, capacity) = (self.view.design.pair_count(&counters), self.view.pair_capacity());
             if pairs <= capacity {
                 return Ok(());
             }
@@ -245,16 +246,12 @@ impl Headless {
     /// Returns the bind group layouts of the geometry of captures in single precision and of lists of active Gaussians, for passes of
     /// clients.
     pub fn capture_layouts(&self) -> [&wgpu::BindGroupLayout; 2] {
-        self.renderer.capture_layouts()
-    }
-
-    /// Returns the bind group to use instead of a list of active Gaussians when all Gaussians are drawn.
-    pub fn no_list(&self) -> &wgpu::BindGroup {
-        &self.renderer.no_list
+        let layouts = &self.renderer.layouts;
+        [&layouts.captures[Storage::Sliced as usize][0], &layouts.active]
     }
 
     /// Returns the bind group of the list of the Gaussians that were active in the frame [recorded](Self::record) last; without a filter,
-    /// [`no_list`](Self::no_list).
+    /// of one that is not read.
     pub fn recorded_list(&self) -> &wgpu::BindGroup {
         self.active.as_ref().map_or(&self.renderer.no_list, |active| &active.list)
     }
@@ -272,7 +269,7 @@ impl Headless {
         self.view.record(&self.renderer, &mut encoder, instances);
         queue.submit([encoder.finish()]);
         self.wait()?;
-        let Some((counters, offset)) = self.view.counters() else { return Ok(Counters::default()) };
+        let Some((counters, offset)) = self.view.design.counters() else { return Ok(Counters::default()) };
         let counters = self.copy_out_from(counters, offset, size_of::<Counters>() as u64)?;
         Ok(bytemuck::pod_read_unaligned(&counters))
     }

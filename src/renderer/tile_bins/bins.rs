@@ -21,7 +21,7 @@ const FEW_GAUSSIANS: u32 = 300;
 pub(super) const SIDES: [u32; 2] = [2, 4];
 
 /// Returns the number of tiles along each side of a bin, 2 or 4, for a picture size and a number of Gaussians.
-pub(in crate::renderer) fn bin_side(picture: UVec2, gaussians: u32) -> u32 {
+pub(super) fn bin_side(picture: UVec2, gaussians: u32) -> u32 {
     let [small, large] = SIDES.map(|side| bin_grid(picture, side).element_product());
     let each = gaussians / large;
     let enough_large = large >= FEW_LARGE_BINS && each <= FEW_GAUSSIANS;
@@ -33,7 +33,7 @@ pub(in crate::renderer) fn bin_side(picture: UVec2, gaussians: u32) -> u32 {
 const CROWDED: u32 = 1 << 20;
 
 /// Returns whether `project_bin` uses the variant with few counters of bins, so that more of its workgroups run at the same time.
-pub(in crate::renderer) fn few_bins(picture: UVec2, side: u32, gaussians: u32) -> bool {
+pub(super) fn few_bins(picture: UVec2, side: u32, gaussians: u32) -> bool {
     gaussians >= CROWDED && bin_grid(picture, side).element_product() <= FEW_BINS_LIMIT
 }
 
@@ -51,7 +51,7 @@ const FEW_TILES: u32 = 1024;
 const LARGE_BATCHES_MEMORY: u32 = 32 * 1024;
 
 /// Returns whether `blend_blocks` uses large batches.
-pub(in crate::renderer) fn large_batches(limits: &wgpu::Limits, instances: &[Instance<'_>]) -> bool {
+pub(super) fn large_batches(limits: &wgpu::Limits, instances: &[Instance<'_>]) -> bool {
     let few = instances.first().is_some_and(|instance| tiles(instance.view.size).element_product() <= FEW_TILES);
     few && limits.max_compute_workgroup_storage_size >= LARGE_BATCHES_MEMORY
 }
@@ -63,7 +63,7 @@ const FIRST_DIVISOR: u32 = 16;
 const FIRST_OF_TILE: u32 = 1024;
 
 /// Returns the initial capacity in splats of all bins together, before any splats have been counted.
-pub(in crate::renderer) fn first_guess(picture: UVec2, side: u32, slots: u32) -> u32 {
+pub(super) fn first_guess(picture: UVec2, side: u32, slots: u32) -> u32 {
     let bins = bin_grid(picture, side).element_product();
     let capacity = (slots / FIRST_DIVISOR).clamp(FIRST_CAPACITY, FIRST_OF_TILE * side * side);
     bins.saturating_mul(slots.min(capacity).max(256))
@@ -75,7 +75,7 @@ const EQUAL_ROOMS: u32 = 1 << 23;
 const EQUAL_ROOMS_OF_PAIR: u32 = 4;
 
 /// Returns the largest number of entries of all bins together with room for the same number of splats, in a view of so many pairs.
-pub(in crate::renderer) fn equal_rooms(pairs: u32) -> u32 {
+pub(super) fn equal_rooms(pairs: u32) -> u32 {
     pairs.saturating_mul(EQUAL_ROOMS_OF_PAIR).max(EQUAL_ROOMS)
 }
 
@@ -85,7 +85,7 @@ const MANY_GAUSSIANS: u32 = 1 << 18;
 const VERY_MANY_GAUSSIANS: u32 = 1 << 20;
 
 /// Returns the number of Gaussians per thread of `project_bin`.
-pub(in crate::renderer) fn per_thread(count: u32) -> u32 {
+pub(super) fn per_thread(count: u32) -> u32 {
     match count {
         0..MANY_GAUSSIANS => 1,
         MANY_GAUSSIANS..VERY_MANY_GAUSSIANS => 2,

@@ -3,58 +3,54 @@
 //! In: the sizes of a view, the buffers that all views share. Out: [`BinBuffers`], for pictures of any size up to [`Sizes::picture`].
 
 use super::bins::{SIDES, bin_grid};
-use super::scratch::{Claim, Scratch, ScratchBuffers};
+use super::scratch::{Claim, ScratchBuffers};
 use crate::renderer::layout::BIN_COUNTERS;
-use crate::renderer::layouts::Layouts;
-use crate::renderer::memory::Allocator;
-use crate::renderer::view::Sizes;
+use crate::renderer::view::{Preparation, Sizes};
 use crate::view::tiles;
 use std::cell::Cell;
-use wgpu::{BindingResource, BufferUsages};
+use wgpu::{BindGroup, BindingResource, BufferUsages};
 
 /// Buffers and bind groups. Pairs of them belong to even and to odd frames.
 #[derive(Debug)]
 pub(in crate::renderer) struct BinBuffers {
-    /// Size of the view's own buffers.
-    pub bytes: u64,
+    pub(super) sizes: Sizes,
+    /// Bytes of the view's own buffers.
+    pub(super) bytes: u64,
     /// The buffers that all views share.
     pub claim: Claim,
     /// Counters (see [`BIN_COUNTERS`]), of parts and of bins; the place of each bin.
     pub bins: [wgpu::Buffer; 2],
-    pub blend_blocks: wgpu::BindGroup,
-    pub(super) find_surfaces: [wgpu::BindGroup; 2],
-    pub(super) project_bin: [wgpu::BindGroup; 2],
-    pub(super) fill_bins: [wgpu::BindGroup; 2],
-    pub(super) sort_bins: [wgpu::BindGroup; 2],
-    pub(super) colors: [wgpu::BindGroup; 2],
+    pub(super) find_surfaces: [BindGroup; 2],
+    pub(super) project_bin: [BindGroup; 2],
+    pub(super) fill_bins: [BindGroup; 2],
+    pub(super) sort_bins: [BindGroup; 2],
+    pub(super) colors: [BindGroup; 2],
+    pub(super) blend_blocks: BindGroup,
 }
 
 impl BinBuffers {
-    /// Creates the view's own buffers, and claims `scratch`, with `sizes.entries` entries in all bins together. `frame` and `instance` are the
-    /// uniforms of the frame and of its instances.
-    pub(in crate::renderer) fn new(
-        allocator: Allocator<'_>,
-        layouts: &Layouts,
-        scratch: &Scratch,
+    /// Creates the view's own buffers, and claims those that all views share, with `sizes.entries` entries in all bins together. The uniforms
+    /// are those of the frame and of its instances.
+    pub(super) fn new(
+        preparation: &Preparation<'_>,
         sizes: Sizes,
-        frame: &wgpu::Buffer,
-        instance: BindingResource<'_>,
+        [frame, instance]: [BindingResource<'_>; 2],
     ) -> Self {
-        let layouts = &layouts.tile_bins;
+        let (allocator, layouts) = (preparation.allocator(), &preparation.renderer.layouts.tile_bins);
         let bytes = Cell::new(0);
-        let storage = |label, count: u64, each: u64, usage: BufferUsages| {
-            let size = count * each;
+        let storage = |label, count: u32, each: u64, usage: BufferUsages| {
+            let size = u64::from(count) * each;
             bytes.set(bytes.get() + size);
             allocator.buffer(label, size, BufferUsages::STORAGE | usage)
         };
-        let tiles = u64::from(tiles(sizes.picture).element_product());
+        let tiles = tiles(sizes.picture).element_product();
         let tile_ranges = storage("gs4d tile ranges", tiles, 8, BufferUsages::empty());
         let tile_surfaces = storage("gs4d tile surfaces", tiles, 4, BufferUsages::empty());
         // The largest number of bins of a picture of this size.
         let count = bin_grid(sizes.picture, SIDES[0]).element_product();
-        let counters = u64::from(2 * count + BIN_COUNTERS + sizes.parts);
+        let counters = 2 * count + BIN_COUNTERS + sizes.parts;
         let bins = [(); 2].map(|()| storage("gs4d bins", counters, 4, BufferUsages::COPY_SRC));
-        let claim = scratch.claim(allocator, &sizes);
+        let claim = preparation.renderer.scratch.claim(allocator, &sizes);
         let ScratchBuffers { splats, visible, splat_colors, pair_splats, entries, ordered, .. } = &*claim.buffers;
 
         let group = |label, layout, first: &BindingResource<'_>, buffers: &[&wgpu::Buffer]| {
@@ -62,7 +58,6 @@ impl BinBuffers {
             let resources: Vec<_> = [first.clone()].into_iter().chain(others).collect();
             allocator.bind_group(label, layout, &resources)
         };
-        let frame = frame.as_entire_binding();
         let both = [[&bins[0], &bins[1]], [&bins[1], &bins[0]]];
         let surfaces = tile_surfaces.as_entire_binding();
         let find_surfaces = both.map(|[now, _]| group("gs4d find_surfaces", &layouts.find_surfaces, &surfaces, &[now]));
@@ -81,25 +76,6 @@ impl BinBuffers {
         let ranges = tile_ranges.as_entire_binding();
         let blend_blocks = group("gs4d blend_blocks", &layouts.blend_blocks, &ranges, &lists);
         let bytes = bytes.get();
-        Self { bytes, claim, bins, blend_blocks, find_surfaces, project_bin, fill_bins, sort_bins, colors }
-    }
-
-    /// Returns the number of a new frame among those of all views.
-    pub(in crate::renderer) fn next_frame(&self) -> u32 {
-        self.claim.buffers.next_frame()
-    }
-
-    /// Creates the bind groups of `motion`, given its `uniforms`.
-    pub(in crate::renderer) fn motion(
-        &self,
-        allocator: Allocator<'_>,
-        layouts: &Layouts,
-        uniforms: &[BindingResource<'_>],
-    ) -> [wgpu::BindGroup; 2] {
-        let ScratchBuffers { splats, visible, splat_colors, .. } = &*self.claim.buffers;
-        self.bins.each_ref().map(|bins| {
-            let own = [bins, visible, splats, splat_colors].map(wgpu::Buffer::as_entire_binding);
-            allocator.bind_group("gs4d motion", &layouts.tile_bins.motion, &[uniforms, &own].concat())
-        })
+        Self { sizes, bytes, claim, bins, find_surfaces, project_bin, fill_bins, sort_bins, colors, blend_blocks }
     }
 }

@@ -5,38 +5,25 @@
 use super::variant::Lists;
 use crate::renderer::iterations::{MOST_ITERATIONS, OTHERS};
 
-/// The counts on which the iterations depend.
-#[derive(Debug, Clone, Copy)]
-pub(in crate::renderer) struct Crowd {
-    /// Number of slots.
-    pub slots: u32,
-    /// Number of splats of the fullest bin.
-    pub fullest: u32,
-    /// Whether pairs or entries of bins may not fit into their buffers, so that `blend_blocks` searches splats.
-    pub searches: bool,
-    /// The variant of `sort_bins`.
-    pub lists: Lists,
-}
-
 /// Scans of all candidates that find the splats of a batch or a round: a step divides a range of 32 bits by 2^8, first of depths, then of slots.
 const STEPS: u64 = 8;
 /// An upper bound of the iterations of a step apart from the scan.
 const OF_STEP: u64 = 60;
 
 /// Returns the number of iterations of a thread of `blend_blocks`, with the smallest batches.
-fn of_blend_blocks(crowd: Crowd) -> u64 {
+fn of_blend_blocks(slots: u32, fullest: u32, searches: bool) -> u64 {
     const BATCH: u64 = 128;
     const THREADS: u64 = 256;
-    let batches = u64::from(crowd.fullest) / BATCH + 1;
+    let batches = u64::from(fullest) / BATCH + 1;
     // Two more scans list the splats of a batch, which are then ordered.
-    let search = (2 + STEPS) * (u64::from(crowd.slots) / THREADS + OF_STEP) + BATCH;
+    let search = (2 + STEPS) * (u64::from(slots) / THREADS + OF_STEP) + BATCH;
     // Queues, and four splats at once.
-    batches * (64 + BATCH / 4 + if crowd.searches { search } else { 0 })
+    batches * (64 + BATCH / 4 + if searches { search } else { 0 })
 }
 
 /// Returns the number of iterations of a thread of `sort_bins`, if all splats of the bin have the same depth: each is compared with all others.
-fn of_sort_bins(crowd: Crowd) -> u64 {
-    let (fullest, [list, threads]) = (u64::from(crowd.fullest), crowd.lists.sizes().map(u64::from));
+fn of_sort_bins(fullest: u32, lists: Lists) -> u64 {
+    let (fullest, [list, threads]) = (u64::from(fullest), lists.sizes().map(u64::from));
     let sort = |count: u64| (count / threads + 1) * (count + count / 2);
     if fullest <= list {
         return sort(fullest);
@@ -48,9 +35,16 @@ fn of_sort_bins(crowd: Crowd) -> u64 {
     4 * scan + (fullest / round + 1) * ((1 + STEPS) * scan + sort(round) + 100)
 }
 
-/// Returns whether tile bins draw a frame with these counts completely.
-pub(in crate::renderer) fn is_complete(crowd: Crowd) -> bool {
-    of_blend_blocks(crowd).max(of_sort_bins(crowd)) + OTHERS <= MOST_ITERATIONS
+/// Returns whether tile bins draw every frame of so many slots completely, on a device with these limits.
+pub(in crate::renderer) fn is_always_complete(limits: &wgpu::Limits, slots: u32) -> bool {
+    // The fullest bin may contain all splats.
+    is_complete(slots, slots, true, Lists::suiting(limits, slots))
+}
+
+/// Returns whether tile bins draw a frame of so many slots completely, with so many splats in the fullest bin and this variant of `sort_bins`.
+/// `searches`: pairs or entries of bins may not fit into their buffers, so that `blend_blocks` searches splats.
+pub(super) fn is_complete(slots: u32, fullest: u32, searches: bool, lists: Lists) -> bool {
+    of_blend_blocks(slots, fullest, searches).max(of_sort_bins(fullest, lists)) + OTHERS <= MOST_ITERATIONS
 }
 
 #[cfg(test)]
@@ -59,7 +53,7 @@ mod tests {
 
     #[test]
     fn frames_are_complete_up_to_a_number_of_splats_in_a_bin() {
-        let complete = |slots, fullest, searches| is_complete(Crowd { slots, fullest, searches, lists: Lists::Medium });
+        let complete = |slots, fullest, searches| is_complete(slots, fullest, searches, Lists::Medium);
         assert!(complete(1_000_000, 2_304, false), "a bin that is sorted at once");
         assert!(complete(1_000_000, 6_000, false), "a bin that is sorted in six rounds");
         assert!(!complete(45_000, 45_000, false), "a bin that is sorted in 40 rounds");

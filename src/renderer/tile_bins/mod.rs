@@ -23,12 +23,9 @@
 //! | `place_bins` | number of splats of each bin | place of each bin among the entries of all bins |
 //! | `fill_bins` | list of the visible splats, splats, places of bins | unordered bins |
 //!
-//! All views of a device share the buffers of splats, pairs and entries ([`Scratch`]): views are drawn one after another.
-//!
 //! `sort_bins` then copies the entries of long bins in order of parts before it sorts part by part, so that its time grows in proportion to them.
 //!
-//! If a frame has more splats or pairs than the buffers can hold, the entries of a bin, or the pairs of whole bins, are not written:
-//! `blend_blocks` searches all splats for the nearest splats of such a tile.
+//! All views of a device share the buffers of splats, pairs and entries ([`Scratch`]): views are drawn one after another.
 
 mod bins;
 mod buffers;
@@ -40,17 +37,13 @@ mod scratch;
 mod stamps;
 mod state;
 mod variant;
+mod view;
 
-pub(super) use bins::{MAX_SLOTS, bin_side, equal_rooms, few_bins, first_guess, large_batches, per_thread};
-pub(super) use buffers::BinBuffers;
+pub(super) use bins::MAX_SLOTS;
 pub(super) use layouts::BinLayouts;
-pub(super) use loops::{Crowd, is_complete};
+pub(super) use loops::is_always_complete;
 pub(super) use passes::BinPasses;
 pub(super) use scratch::Scratch;
-pub(super) use state::{BinRoom, BinState};
 pub(super) use variant::BinVariant;
 pub use variant::{Blending, COUNTED, EIGHT_AT_ONCE, FEW_BINS, LARGE_BATCHES, Lists, OPAQUE};
-
-/// Names of the timed passes of a frame, in order. The last two are the passes of motions.
-pub(super) const TIMED_PASSES: &[&str] =
-    &["project_bin", "sort_bins", "colors", "blend_blocks", "motion", "blend_blocks (motion)"];
+pub(super) use view::TileBins;

@@ -17,37 +17,22 @@ const COLOR_BYTES: usize = 16;
 /// Buffers that are too large for every view by more than this factor are replaced.
 const OVERSIZE_FACTOR: u32 = 4;
 
-/// Numbers of elements of the buffers.
-#[derive(Debug, Clone, Copy)]
-struct Room {
-    slots: u32,
-    pairs: u32,
-    entries: u32,
-    ordered: u32,
-}
+/// Numbers of elements of the buffers: slots, pairs, entries, ordered entries.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Room([u32; 4]);
 
 impl Room {
     fn of(sizes: &Sizes) -> Self {
-        let Sizes { slots, pairs, entries, ordered, .. } = *sizes;
-        Self { slots, pairs, entries: entries.max(1), ordered: ordered.max(1) }
-    }
-
-    fn numbers(self) -> [u32; 4] {
-        [self.slots, self.pairs, self.entries, self.ordered]
+        Self([sizes.slots, sizes.pairs, sizes.entries.max(1), sizes.ordered.max(1)])
     }
 
     fn largest(self, other: Self) -> Self {
-        Self {
-            slots: self.slots.max(other.slots),
-            pairs: self.pairs.max(other.pairs),
-            entries: self.entries.max(other.entries),
-            ordered: self.ordered.max(other.ordered),
-        }
+        Self(std::array::from_fn(|i| self.0[i].max(other.0[i])))
     }
 
     /// Returns whether buffers of this room suit views that need `wanted`: none is too small, and none far too large.
     fn suits(self, wanted: Self) -> bool {
-        let mut both = self.numbers().into_iter().zip(wanted.numbers());
+        let mut both = self.0.into_iter().zip(wanted.0);
         both.all(|(made, wanted)| made >= wanted && made / OVERSIZE_FACTOR <= wanted)
     }
 }
@@ -83,7 +68,7 @@ impl ScratchBuffers {
             bytes += size;
             allocator.buffer(label, size, BufferUsages::STORAGE)
         };
-        let Room { slots, pairs, entries, ordered } = room;
+        let Room([slots, pairs, entries, ordered]) = room;
         Self {
             room,
             splats: storage("gs4d splats", slots, size_of::<SplatShape>()),
@@ -135,11 +120,6 @@ pub(in crate::renderer) struct Claim {
 }
 
 impl Claim {
-    /// Returns the size of the shared buffers.
-    pub(in crate::renderer) fn bytes(&self) -> u64 {
-        self.buffers.bytes
-    }
-
     /// Makes `frame` the number of the next frame.
     #[cfg(test)]
     pub(in crate::renderer) fn skip_to(&self, frame: u32) {
@@ -176,13 +156,12 @@ mod tests {
 
     #[test]
     fn buffers_suit_if_they_are_large_enough_but_not_far_too_large() {
-        let room = |slots, pairs| Room { slots, pairs, entries: 100, ordered: 1 };
+        let room = |slots, pairs| Room([slots, pairs, 100, 1]);
         let made = room(1000, 4000);
         assert!(made.suits(room(1000, 4000)), "the same room");
         assert!(made.suits(room(250, 1000)), "four times as large");
         assert!(!made.suits(room(1001, 4000)), "a splat has no room");
         assert!(!made.suits(room(199, 4000)), "more than four times as large");
-        let largest = room(10, 4000).largest(room(1000, 20));
-        assert_eq!(largest.numbers(), made.numbers(), "room for either view");
+        assert_eq!(room(10, 4000).largest(room(1000, 20)), made, "room for either view");
     }
 }

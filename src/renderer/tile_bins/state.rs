@@ -11,100 +11,99 @@ use crate::renderer::view::Sizes;
 use glam::UVec2;
 
 /// The bins of a view: of the frame prepared last, unless something else is said.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(in crate::renderer) struct BinState {
-    /// Tiles along each side of a bin.
+    /// Size of the picture, and tiles along each side of a bin.
+    pub picture: UVec2,
     pub side: u32,
     pub variant: BinVariant,
+    /// The variant with which motions are blended: without depths.
+    pub motion: BinVariant,
     /// Whether the counters of odd frames are used.
     pub odd: bool,
+    /// Whether the frame has been recorded.
+    pub recorded: bool,
     /// Number of the frame among those of all views.
     pub frame: u32,
     /// Number of splats of the fullest bin of an earlier frame.
     pub fullest: u32,
-    /// Number of visible splats of an earlier frame; `u32::MAX` before any have been counted.
-    pub visible: u32,
+    /// Number of visible splats of an earlier frame, if they have been counted.
+    pub visible: Option<u32>,
     /// Number of bins that the frame recorded last has cleared for the next frame.
     pub cleared: u32,
     /// The wanted capacity.
-    pub room: BinRoom,
-}
-
-impl Default for BinState {
-    fn default() -> Self {
-        Self {
-            side: 1,
-            variant: BinVariant::default(),
-            odd: false,
-            frame: 0,
-            fullest: 0,
-            visible: u32::MAX,
-            cleared: 0,
-            room: BinRoom::default(),
-        }
-    }
+    room: BinRoom,
 }
 
 impl BinState {
+    /// Returns the bins of another view, with the wanted capacity of this view, whose bins have so many entries.
+    pub(super) fn another(&self, entries: u32) -> Self {
+        let made = if self.variant.counted { 0 } else { entries };
+        let BinRoom { wanted, is_known, .. } = self.room;
+        let room = BinRoom { wanted: wanted.max(made), is_known, ..BinRoom::default() };
+        Self { room, ..Self::default() }
+    }
+
     /// Returns 1 if the counters of odd frames are used, otherwise 0.
     pub(in crate::renderer) fn parity(&self) -> usize {
         usize::from(self.odd)
     }
 
-    /// Returns the number of bins across and down a picture.
-    pub(in crate::renderer) fn grid(&self, picture: UVec2) -> UVec2 {
-        bin_grid(picture, self.side)
+    /// Returns the number of bins across and down the picture.
+    pub(super) fn grid(&self) -> UVec2 {
+        bin_grid(self.picture, self.side)
     }
 
-    /// Returns the number of bins of a picture.
-    pub(in crate::renderer) fn count(&self, picture: UVec2) -> u32 {
-        self.grid(picture).element_product()
+    /// Returns the number of bins of the picture.
+    pub(super) fn count(&self) -> u32 {
+        self.grid().element_product()
     }
 
-    /// Returns the uniform `binning` of a part in a picture.
-    pub(in crate::renderer) fn uniform(&self, sizes: &Sizes, picture: UVec2, part: u32) -> [u32; 4] {
-        [self.side | (stamp(self.frame) << 8), self.capacity(sizes, picture), part, sizes.parts]
+    /// Returns the uniform `binning` of a part, given the sizes of the view.
+    pub(super) fn uniform(&self, sizes: &Sizes, part: u32) -> [u32; 4] {
+        [self.side | (stamp(self.frame) << 8), self.capacity(sizes), part, sizes.parts]
     }
 
-    /// Returns the capacity of each bin of a picture; 0 if bins are counted before they are filled.
-    fn capacity(&self, sizes: &Sizes, picture: UVec2) -> u32 {
-        if self.variant.counted { 0 } else { sizes.entries / self.count(picture) }
+    /// Returns the capacity of each bin; 0 if bins are counted before they are filled.
+    fn capacity(&self, sizes: &Sizes) -> u32 {
+        if self.variant.counted { 0 } else { sizes.entries / self.count() }
     }
 
     /// Returns whether bins must be counted before they are filled, because room for the same number of splats in each would be more than
     /// `most` entries. `guess` is the number of these entries before splats have been counted.
-    pub(in crate::renderer) fn must_count(&self, guess: u32, most: u32) -> bool {
+    pub(super) fn must_count(&self, guess: u32, most: u32) -> bool {
         most < if self.room.is_known { self.room.wanted } else { guess }
     }
 
     /// Returns the number of entries of all bins of a view of so many pairs. `guess` and `most` are those of [`must_count`](Self::must_count).
-    pub(in crate::renderer) fn entries(&self, guess: u32, most: u32, pairs: u32) -> u32 {
+    pub(super) fn entries(&self, guess: u32, most: u32, pairs: u32) -> u32 {
         // Each entry has at least one pair.
         if self.variant.counted { pairs } else { self.room.wanted.max(guess).min(most) }
     }
 
     /// Returns whether some entries or pairs of a frame with these counts may have no room.
-    pub(in crate::renderer) fn lacks_room(&self, sizes: &Sizes, picture: UVec2, counters: &Counters) -> bool {
+    pub(super) fn lacks_room(&self, sizes: &Sizes, counters: &Counters) -> bool {
         let fullest = counters.pairs_wanted;
         let too_many = if self.variant.counted {
-            fullest.saturating_mul(self.count(picture)).min(counters.pairs) > sizes.entries.min(sizes.ordered)
+            fullest.saturating_mul(self.count()).min(counters.pairs) > sizes.entries.min(sizes.ordered)
         } else {
-            fullest > self.capacity(sizes, picture)
+            fullest > self.capacity(sizes)
         };
         too_many || counters.pairs > sizes.pairs
     }
 
-    /// Processes the counters of a frame of a picture that was drawn with these sizes.
-    pub(in crate::renderer) fn note(&mut self, sizes: &Sizes, picture: UVec2, counters: &Counters) {
+    /// Processes the counters of a frame that was drawn with these sizes.
+    pub(super) fn note(&mut self, sizes: &Sizes, counters: &Counters) {
+        (self.fullest, self.visible) = (counters.pairs_wanted, Some(counters.visible));
         let capacity = if self.variant.counted { 0 } else { sizes.entries };
-        self.room.note(counters.pairs_wanted.saturating_mul(self.count(picture)), capacity);
+        self.room.note(self.fullest.saturating_mul(self.count()), capacity);
     }
 }
 
 /// The wanted capacity of all bins together with equal rooms, in splats: the number of bins times the number of splats in the fullest bin, and
 /// a reserve.
 #[derive(Debug, Default)]
-pub(in crate::renderer) struct BinRoom {
+struct BinRoom {
     wanted: u32,
     /// Whether splats have been counted.
     is_known: bool,
@@ -119,11 +118,6 @@ const FRAMES_OF_PEAK: u32 = 1200;
 const MUCH: u32 = 4;
 
 impl BinRoom {
-    /// Returns the wanted capacity of another view, or `capacity` if that is larger.
-    pub(in crate::renderer) fn of(other: &Self, capacity: u32) -> Self {
-        Self { wanted: other.wanted.max(capacity), is_known: other.is_known, ..Self::default() }
-    }
-
     /// Processes the capacity that a frame needed, and the `capacity` that it had, 0 if bins were counted. A frame that exceeds its capacity is
     /// slow: the wanted capacity grows before it is exceeded, and is reduced only after many frames that did not need it.
     fn note(&mut self, needed: u32, capacity: u32) {
@@ -149,24 +143,24 @@ mod tests {
 
     #[test]
     fn bins_are_counted_if_equal_rooms_would_be_too_large() {
-        let (picture, guess) = (UVec2::new(3840, 2160), 5000);
-        let mut bins = BinState { side: 4, ..BinState::default() };
+        let guess = 5000;
+        let mut bins = BinState { picture: UVec2::new(3840, 2160), side: 4, ..BinState::default() };
         assert!(bins.must_count(guess, 4999), "nothing is known yet: the guess decides");
         assert!(!bins.must_count(guess, 5000), "the guess fits");
         let counters = Counters { visible: 300, pairs: 700, pairs_wanted: 100, padding: 0 };
         let sizes = Sizes { pairs: 700, entries: 5000, ordered: 700, ..Sizes::default() };
-        bins.note(&sizes, picture, &counters);
-        let needed = bins.count(picture) * 100;
+        bins.note(&sizes, &counters);
+        let needed = bins.count() * 100;
         assert!(bins.must_count(guess, needed), "the fullest bin is known, and needs a reserve of one half");
         assert!(!bins.must_count(guess, needed + needed / 2), "equal rooms with their reserve fit");
         assert_eq!(bins.entries(guess, 2 * needed, 700), needed + needed / 2, "equal rooms");
-        assert!(bins.lacks_room(&sizes, picture, &counters), "the fullest bin has no room");
+        assert!(bins.lacks_room(&sizes, &counters), "the fullest bin has no room");
         bins.variant.counted = true;
         assert_eq!(bins.entries(guess, needed, 700), 700, "an entry for each pair");
-        assert_eq!(bins.uniform(&sizes, picture, 0)[1], 0, "the bins have no capacity each");
-        assert!(!bins.lacks_room(&sizes, picture, &counters), "all entries have room");
+        assert_eq!(bins.uniform(&sizes, 0)[1], 0, "the bins have no capacity each");
+        assert!(!bins.lacks_room(&sizes, &counters), "all entries have room");
         let few = Sizes { ordered: 699, ..sizes };
-        assert!(bins.lacks_room(&few, picture, &counters), "there may be as many entries as pairs");
+        assert!(bins.lacks_room(&few, &counters), "there may be as many entries as pairs");
     }
 
     #[test]

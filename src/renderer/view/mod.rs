@@ -5,7 +5,6 @@
 //! [`ViewRenderer::record`] records the frame.
 mod choice;
 mod motion;
-mod motion_passes;
 mod parameters;
 mod prepare;
 mod readback;
@@ -15,8 +14,10 @@ mod sizes;
 #[cfg(test)]
 mod tests;
 mod uniforms;
+mod view_design;
 mod view_renderer;
 
 pub use parameters::{Instance, OpaqueDepth, ViewParameters};
 pub(super) use sizes::{Sizes, max_pairs};
+pub(super) use view_design::{Preparation, ViewDesign};
 pub use view_renderer::ViewRenderer;

@@ -4,36 +4,35 @@
 
 use super::motion::MotionResources;
 use super::parameters::{Instance, ViewParameters};
-use super::resources::{DesignBuffers, Resources};
+use super::resources::{Resources, texture_bytes};
 use super::sizes::{Sizes, grown, max_pairs};
+use super::view_design::Preparation;
 use super::view_renderer::ViewRenderer;
 use crate::renderer::active::{drawn_count, most_at_once, most_drawn};
-use crate::renderer::design::Design;
 use crate::renderer::error::GpuError;
-use crate::renderer::global_sort;
-use crate::renderer::layout::{self, BLOCK, Counters};
+use crate::renderer::layout::{BLOCK, Counters, SplatRecord};
 use crate::renderer::memory::{binding_limit, require_texture};
 use crate::renderer::pipelines::Renderer;
 use crate::renderer::shaders::Pixels;
-use crate::renderer::tile_bins::{self, BinVariant, Lists};
 use crate::renderer::timing::{PassTime, PassTimer, WHOLE_FRAME};
 use crate::view::DebugView;
-use glam::UVec2;
 
 /// Buffers that are too large by more than this factor, for more than this number of frames, are replaced.
 const OVERSIZE_FACTOR: u32 = 4;
 const RELEASE_AFTER_IDLE_FRAMES: u32 = 120;
 
-/// Checks that a view with this design can draw so many Gaussians.
-fn check_slots(limits: &wgpu::Limits, design: Design, slots: usize) -> Result<(), GpuError> {
-    let splat = size_of::<layout::SplatRecord>() as u64;
-    let limit = match design {
-        Design::GlobalSort => binding_limit(limits),
-        Design::Auto | Design::TileBins => binding_limit(limits).min(u64::from(tile_bins::MAX_SLOTS) * splat),
-    };
+/// Checks that a view can draw so many Gaussians, in a design that draws at most so many splats.
+fn check_slots(limits: &wgpu::Limits, most_slots: u32, slots: usize) -> Result<(), GpuError> {
     // The buffer of splats has the largest elements per slot.
+    let splat = size_of::<SplatRecord>() as u64;
+    let limit = binding_limit(limits).min(u64::from(most_slots) * splat);
     let needed = (slots as u64).next_multiple_of(u64::from(BLOCK)) * splat;
     if needed > limit { Err(GpuError::TooLarge { what: "the splats", needed, limit }) } else { Ok(()) }
+}
+
+/// Returns the sum of a number of each instance.
+fn sum(instances: &[Instance<'_>], number: impl Fn(&Instance<'_>) -> usize) -> u32 {
+    u32::try_from(instances.iter().map(number).sum::<usize>()).unwrap_or(u32::MAX)
 }
 
 impl ViewRenderer {
@@ -42,7 +41,7 @@ impl ViewRenderer {
     /// # Errors
     /// When the buffer of its splats would be larger than the device can bind.
     pub fn check_room(device: &wgpu::Device, most_drawn: usize) -> Result<(), GpuError> {
-        check_slots(&device.limits(), Design::GlobalSort, most_drawn)
+        check_slots(&device.limits(), u32::MAX, most_drawn)
     }
 
     /// Sizes the buffers for the instances and for the pairs that earlier frames counted, and writes the uniforms. Call
@@ -64,147 +63,110 @@ impl ViewRenderer {
         // The maximum over time, so that another segment of a filter does not change the buffers.
         let at_most: usize = instances.iter().map(|instance| most_drawn(instance.capture, instance.active)).sum();
         self.choose_design(device, renderer, at_most);
-        let (precision, blending) = (parameters.precision, parameters.blending());
-        let picture = instances.first().map_or(self.picture, |instance| instance.view.size);
-        let sum = |count: fn(&Instance<'_>) -> usize| {
-            u32::try_from(instances.iter().map(count).sum::<usize>()).unwrap_or(u32::MAX)
+        let blending = parameters.blending();
+        let frame = Preparation {
+            renderer,
+            device,
+            queue,
+            instances,
+            blending,
+            pixels: Pixels { multisampled: blending.is_multisampled(), precision: parameters.precision },
+            at_most,
+            gaussians: sum(instances, |instance| most_at_once(instance.capture, instance.active)),
+            most_pairs: max_pairs(device),
         };
-        let gaussians = sum(|instance| most_at_once(instance.capture, instance.active));
-        let limits = device.limits();
-        require_texture(picture, &limits)?;
-        check_slots(&limits, self.design, at_most)?;
-        let slots = at_most as u32;
-        // A first guess; the counters of later frames correct it.
-        let guess = gaussians.saturating_mul(2).min(slots.saturating_mul(6)).max(1 << 16);
-        let most = max_pairs(device);
-        let pairs = self.pairs_wanted.max(guess).min(most);
-        let side = tile_bins::bin_side(picture, gaussians);
-        // An entry has twice as many bytes as a pair.
-        let equal_rooms = tile_bins::equal_rooms(pairs).min(most / 2);
-        let first_entries = |picture| tile_bins::first_guess(picture, side, slots);
-        self.pixels = Pixels { multisampled: blending.is_multisampled(), precision };
+        let sizes = self.choose_sizes(&frame)?;
         self.has_depths = parameters.depths;
-        let joined = instances.chunk_by(Instance::joins);
-        let drawn = joined.map(|joined| (joined[0].capture.storage, joined.len() > 1));
-        let writes_depths = if self.design == Design::GlobalSort {
-            if renderer.is_software {
-                self.at_once = global_sort::at_once(at_most).ok_or(GpuError::TooManySplats { slots: at_most })?;
-            }
-            renderer.passes.global_sort.compile(device, drawn, self.pixels, self.at_once)?;
-            true
-        } else {
-            let large_batches = tile_bins::large_batches(&limits, instances);
-            let lists = Lists::suiting(&limits, self.bins.fullest);
-            let few_bins = tile_bins::few_bins(picture, side, gaussians);
-            let counted = self.bins.must_count(first_entries(picture), equal_rooms);
-            let wanted = BinVariant { few_bins, counted, lists, blending, precision, large_batches };
-            self.bins.variant = renderer.bin_variant(device, drawn, wanted)?;
-            blending.writes_depths()
-        };
-        if std::mem::take(&mut self.recorded) {
-            self.bins.odd = !self.bins.odd;
-        }
-        let made = self.resources.as_ref().map(|resources| resources.sizes).unwrap_or_default();
-        let parts: usize = instances.iter().map(|instance| instance.capture.parts.len()).sum();
-        (self.picture, self.bins.side) = (picture, side);
-        let in_bins = self.bins.fullest.saturating_mul(self.bins.count(picture));
-        self.short_of_room = self.statistics.pairs > most || in_bins.min(self.statistics.pairs) > most / 2;
-        let entries = |picture| match self.design {
-            Design::GlobalSort => 0,
-            Design::Auto | Design::TileBins => {
-                self.bins.entries(first_entries(picture), equal_rooms, pairs).min(most / 2)
-            }
-        };
-        let needed = |picture| Sizes {
-            slots: slots.next_multiple_of(BLOCK).max(BLOCK),
-            pairs,
-            entries: entries(picture),
-            ordered: if self.bins.variant.counted { entries(picture) } else { 0 },
-            parts: (parts as u32).max(1),
-            picture,
-            depths: if writes_depths { picture } else { UVec2::ONE },
-        };
-        let [exact, grown] = [picture, grown(made.picture, picture, limits.max_texture_dimension_2d)].map(needed);
-        let sizes = self.kept_sizes(made, exact, grown, guess);
-        let environment = instances.iter().find_map(|i| Some((i, i.capture.environment.as_ref()?)));
+        let environment = instances.iter().find_map(|i| i.capture.environment.as_ref());
         let opaque = parameters.opaque.filter(|opaque| opaque.samples > 0);
         let opaque_view = opaque.map_or(&self.no_depth, |depth| depth.texture).clone();
-        let environment_buffer = environment.map_or(&self.no_environment, |(_, map)| &map.buffer).clone();
-        match &mut self.resources {
-            Some(made) if made.sizes == sizes && made.pixels == self.pixels && made.shares_current(renderer) => {
-                let allocator = renderer.allocator(device);
-                made.bind_pixel(allocator, &renderer.layouts, &self.frame, opaque_view, environment_buffer);
-            }
-            _ => {
-                self.bins.odd = false;
-                // The old buffers are freed, and what they claim of the shared ones, before new ones are created.
-                (self.motion, self.resources) = (None, None);
-                self.resources = Some(Resources::new(
-                    renderer,
-                    device,
-                    queue,
-                    self.design,
-                    sizes,
-                    self.pixels,
-                    &self.frame,
-                    opaque_view,
-                    environment_buffer,
-                ));
-            }
-        }
-        if let Some(DesignBuffers::TileBins(buffers)) = self.resources.as_ref().map(|made| &made.buffers) {
-            self.bins.frame = buffers.next_frame();
-        }
+        let environment_buffer = environment.map_or(&self.no_environment, |map| &map.buffer).clone();
+        self.fit(&frame, sizes, opaque_view, environment_buffer);
+        self.design.begin();
         let active =
             |i: &Instance<'_>| (0..i.capture.parts.len()).map(|at| drawn_count(i.capture, at, i.active)).sum::<u32>();
         self.slots = instances.iter().map(active).sum();
-        self.prepare_motion(device, queue, renderer, instances, parameters)?;
-        self.statistics.bytes = self.resources.as_ref().map_or(0, |made| made.bytes)
-            + self.motion.as_ref().map_or(0, MotionResources::bytes);
-        self.statistics.shared_bytes = self.resources.as_ref().map_or(0, Resources::shared_bytes);
-        self.statistics.total = sum(|instance| instance.capture.len());
+        self.prepare_motion(&frame, parameters)?;
+        self.count_bytes();
+        self.statistics.total = sum(instances, |instance| instance.capture.len());
         self.statistics.active = self.slots;
-        self.write_uniforms(queue, instances, parameters, environment.map(|(i, m)| (i.view, i.appearance, m.size)));
+        self.write_instances(&frame, parameters);
+        self.write_frame(&frame, parameters);
         Ok(())
     }
 
+    /// Chooses the variants of the passes, and returns the sizes to allocate.
+    fn choose_sizes(&mut self, frame: &Preparation<'_>) -> Result<Sizes, GpuError> {
+        let (limits, slots, most) = (frame.device.limits(), frame.at_most as u32, frame.most_pairs);
+        let picture = frame.instances.first().map_or(self.picture, |instance| instance.view.size);
+        require_texture(picture, &limits)?;
+        check_slots(&limits, self.design.most_slots(), frame.at_most)?;
+        // A first guess; the counters of later frames correct it.
+        let guess = frame.gaussians.saturating_mul(2).min(slots.saturating_mul(6)).max(1 << 16);
+        let parts = sum(frame.instances, |instance| instance.capture.parts.len());
+        let made = self.resources.as_ref().map(|made| made.sizes).unwrap_or_default();
+        let mut sizes = [picture, grown(made.picture, picture, limits.max_texture_dimension_2d)].map(|picture| Sizes {
+            slots: slots.next_multiple_of(BLOCK).max(BLOCK),
+            pairs: self.pairs_wanted.max(guess).min(most),
+            entries: 0,
+            ordered: 0,
+            parts: parts.max(1),
+            picture,
+            depths: picture,
+        });
+        self.design.choose(frame, &mut sizes)?;
+        self.picture = picture;
+        let pairs = self.statistics.pairs;
+        self.short_of_room = pairs > most || self.design.entries_needed().min(pairs) > most / 2;
+        Ok(self.kept_sizes(made, sizes, guess))
+    }
+
+    /// Creates the resources of a frame, unless they exist, and binds its opaque depth and its environment map.
+    fn fit(&mut self, frame: &Preparation<'_>, sizes: Sizes, opaque: wgpu::TextureView, environment: wgpu::Buffer) {
+        let is_fit = |made: &&mut Resources| {
+            made.sizes == sizes && made.pixels == frame.pixels && self.design.shares_current(frame.renderer)
+        };
+        if let Some(made) = self.resources.as_mut().filter(is_fit) {
+            made.bind_pixel(frame, &self.frame, opaque, environment);
+            return;
+        }
+        // The old resources are freed before new ones are created.
+        (self.motion, self.resources) = (None, None);
+        self.resources = Some(Resources::new(frame, &mut *self.design, sizes, &self.frame, opaque, environment));
+    }
+
+    /// Counts the bytes of buffers and targets.
+    fn count_bytes(&mut self) {
+        let [own, shared] = self.design.bytes();
+        let targets = self.resources.iter().flat_map(|made| [&made.color, &made.depth]);
+        let targets = targets.chain(self.motion.iter().map(|motion| &motion.texture));
+        self.statistics.bytes = own + targets.map(texture_bytes).sum::<u64>();
+        self.statistics.shared_bytes = shared;
+    }
+
     /// Creates the resources of motions if the frame has motions and they do not exist; releases them if it has none.
-    fn prepare_motion(
-        &mut self,
-        device: &wgpu::Device,
-        queue: &wgpu::Queue,
-        renderer: &Renderer,
-        instances: &[Instance<'_>],
-        parameters: &ViewParameters<'_>,
-    ) -> Result<(), GpuError> {
+    fn prepare_motion(&mut self, frame: &Preparation<'_>, parameters: &ViewParameters<'_>) -> Result<(), GpuError> {
         let known = self.motion.take();
-        if parameters.previous.is_some() {
-            let storages = instances.iter().map(|instance| instance.capture.storage);
-            renderer.passes.compile_motion(device, storages, self.design)?;
+        if let (Some(_), Some(made)) = (parameters.previous, &self.resources) {
             let color = ViewParameters { depths: false, debug: DebugView::Color, ..*parameters };
-            let mut variant = BinVariant { blending: color.blending(), ..self.bins.variant };
-            if self.design == Design::TileBins {
-                variant = renderer.bin_variant(device, std::iter::empty(), variant)?;
-            }
-            if let Some(made) = &self.resources {
-                let allocator = renderer.allocator(device);
-                let mut motion = known.unwrap_or_else(|| MotionResources::new(renderer, allocator, made, variant));
-                motion.update(renderer, allocator, made, variant);
-                self.motion = Some(motion);
+            self.design.compile_motion(frame, color.blending())?;
+            self.motion = known.or_else(|| MotionResources::new(frame, made, &*self.design));
+            if let Some(motion) = &mut self.motion {
+                motion.update(frame, made);
             }
         }
         // Frames with motions have more timed passes. A frame timed as a whole has none.
         let stale = |timer: &PassTimer| !timer.passes().is_empty() && timer.passes() != self.timed_passes();
         if self.timing.as_ref().is_some_and(|(timer, _)| stale(timer)) {
-            self.measure(device, queue, renderer, false);
-            self.measure(device, queue, renderer, true);
+            self.measure(frame.device, frame.queue, frame.renderer, false);
+            self.measure(frame.device, frame.queue, frame.renderer, true);
         }
         Ok(())
     }
 
     /// Returns the sizes to allocate. Sizes grow from frame to frame, but buffers that have been far too large for some frames are reduced.
     /// `exact` are the sizes that the frame needs, with `guess` pairs; `grown` are the same sizes with a reserve for larger pictures.
-    fn kept_sizes(&mut self, made: Sizes, exact: Sizes, grown: Sizes, guess: u32) -> Sizes {
+    fn kept_sizes(&mut self, made: Sizes, [exact, grown]: [Sizes; 2], guess: u32) -> Sizes {
         let counted = self.statistics.pairs.saturating_add(self.statistics.pairs / 2).max(1 << 16);
         let oversized = made.slots / OVERSIZE_FACTOR > exact.slots
             || made.pairs / OVERSIZE_FACTOR > guess.max(counted)
@@ -235,11 +197,7 @@ impl ViewRenderer {
         if let Some(counters) = self.readback.poll().filter(|_| current) {
             let counters: Counters = bytemuck::pod_read_unaligned(&counters);
             self.statistics.visible = counters.visible;
-            self.statistics.pairs = self.pair_count(&counters);
-            if self.design == Design::TileBins {
-                self.bins.fullest = counters.pairs_wanted;
-                self.bins.visible = counters.visible;
-            }
+            self.statistics.pairs = self.design.pair_count(&counters);
             self.make_room(&counters);
         }
         if let Some((timer, readback)) = &mut self.timing

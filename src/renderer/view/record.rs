@@ -3,7 +3,6 @@
 //! In: a prepared view and the instances for which it was prepared. Out: one compute pass, in the order of the table in [`crate::renderer`].
 
 use super::parameters::Instance;
-use super::resources::DesignBuffers;
 use super::view_renderer::ViewRenderer;
 use crate::renderer::pipelines::Renderer;
 use crate::renderer::recording::Recording;
@@ -33,30 +32,21 @@ impl ViewRenderer {
         timer: Option<&PassTimer>,
     ) {
         let Some(made) = &self.resources else { return };
-        if let DesignBuffers::TileBins(buffers) = &made.buffers {
-            buffers.clear(encoder, &self.bins, self.picture, self.slots);
-        }
+        self.design.clear(encoder, self.slots);
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: Some("gs4d"),
             timestamp_writes: timer.and_then(PassTimer::frame_writes),
         });
-        let frame = Recording { renderer, instances, picture: self.picture, pixel: &made.pixel, timer };
-        match &made.buffers {
-            DesignBuffers::TileBins(buffers) => {
-                buffers.record(&frame, &mut pass, &self.bins, self.slots, self.has_colors);
-            }
-            DesignBuffers::GlobalSort(buffers) => {
-                buffers.record(&frame, &mut pass, self.slots, self.pixels, self.at_once);
-            }
+        let Self { picture, slots, has_colors, .. } = *self;
+        let frame = Recording { renderer, instances, picture, slots, has_colors, pixel: &made.pixel, timer };
+        self.design.record(&frame, &mut pass);
+        if let Some(motion) = &self.motion {
+            self.design.record_motion(&Recording { pixel: &motion.pixel, ..frame }, &motion.motion, &mut pass);
         }
-        self.record_motion(&frame, made, &mut pass);
         drop(pass);
-        if let Some((counters, offset)) = self.counters().filter(|_| self.readback.is_idle()) {
-            let counters = counters.clone();
-            self.readback.copy(encoder, &counters, offset);
+        if let Some((counters, offset)) = self.design.counters().filter(|_| self.readback.is_idle()) {
+            self.readback.copy(encoder, counters, offset);
             self.copied_from = self.generation;
         }
-        self.bins.cleared = self.bins.count(self.picture);
-        self.recorded = true;
     }
 }

@@ -3,7 +3,6 @@
 //! In: synthetic scenes, frames with and without Gaussians, counters that the tests write. Out: proof that a frame depends on no counter and no
 //! splat of an earlier frame. Skipped where there is no GPU.
 
-use super::resources::DesignBuffers;
 use super::{Instance, OpaqueDepth, ViewParameters, ViewRenderer};
 use crate::gaussian::{Gaussian, Harmonics};
 use crate::renderer::capture::GpuCapture;
@@ -12,11 +11,12 @@ use crate::renderer::device::GpuContext;
 use crate::renderer::layout::Counters;
 use crate::renderer::pipelines::Renderer;
 use crate::renderer::shaders::ShaderChecks;
-use crate::renderer::tile_bins::{BinBuffers, BinVariant, Blending, Lists, MAX_SLOTS};
+use crate::renderer::tile_bins::{BinVariant, Blending, Lists, MAX_SLOTS, TileBins};
 use crate::scene::{Bounds, RuntimeScene};
 use crate::view::{Appearance, Camera, RasterFov, View};
 use depth_texture::uniform_depth;
 use glam::{UVec2, Vec3};
+use std::any::Any;
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -55,12 +55,10 @@ fn gpu() -> Option<Gpu> {
     }
 }
 
-/// Returns the buffers of a view that has been prepared.
-fn buffers(view: &ViewRenderer) -> &BinBuffers {
-    match view.resources.as_ref().map(|made| &made.buffers) {
-        Some(DesignBuffers::TileBins(buffers)) => buffers,
-        other => panic!("the view has tile bins, not {other:?}"),
-    }
+/// Returns the tile bins of a view.
+fn bins(view: &ViewRenderer) -> &TileBins {
+    let design: &dyn Any = &*view.design;
+    design.downcast_ref().expect("the view is drawn with tile bins")
 }
 
 impl Gpu {
@@ -106,7 +104,7 @@ impl Gpu {
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         view.record(&self.renderer, &mut encoder, &instances);
         queue.submit([encoder.finish()]);
-        let (counters, offset) = view.counters().expect("a prepared view");
+        let (counters, offset) = view.design.counters().expect("a prepared view");
         bytemuck::pod_read_unaligned(&self.read(size_of::<Counters>() as u64, |encoder, to| {
             encoder.copy_buffer_to_buffer(counters, offset, to, 0, to.size());
         }))
@@ -187,8 +185,8 @@ fn the_number_of_pairs_saturates() {
     // The buffers have grown by then.
     let expected = [(); 6].map(|()| gpu.draw(&mut view, &capture, 0.0))[5];
     let picture = gpu.picture(&view);
-    let next = 1 - view.bins.parity();
-    let counters = buffers(&view).bins[next].clone();
+    let TileBins { state, buffers } = bins(&view);
+    let counters = buffers.as_ref().expect("a prepared view").bins[1 - state.parity()].clone();
     gpu.context.queue.write_buffer(&counters, 0, &(u32::MAX - 10).to_ne_bytes());
     let found = gpu.draw(&mut view, &capture, 0.0);
     let saturated = Counters { pairs: u32::MAX, padding: 0, ..expected };
@@ -216,7 +214,8 @@ fn splats_of_a_frame_with_the_same_stamp_are_not_drawn() {
     let mut view = gpu.view();
     assert_eq!(gpu.draw(&mut view, &capture, 0.0).visible, 6_000, "all are present at time 0");
     // As after 65,534 more frames of any view. The bins are still too small for the splats, so that tiles search them.
-    buffers(&view).claim.skip_to(view.bins.frame + 0xffff);
+    let TileBins { state, buffers } = bins(&view);
+    buffers.as_ref().expect("a prepared view").claim.skip_to(state.frame + 0xffff);
     gpu.draw(&mut view, &capture, 1.0);
     let apart = largest_difference(&gpu.picture(&view), &expected);
     assert!(apart <= 1e-6, "the frame with the stamp of the first frame differs by {apart}");
@@ -312,7 +311,7 @@ fn a_view_draws_with_another_variant_until_the_wanted_one_is_compiled() {
     let mut view = gpu.view();
     gpu.draw(&mut view, &capture, 0.5);
     let (device, drawn) = (&gpu.context.device, std::iter::once((capture.storage, false)));
-    let compiled = view.bins.variant;
+    let compiled = bins(&view).state.variant;
     let wanted = BinVariant { lists: Lists::Short, large_batches: !compiled.large_batches, ..compiled };
     assert_ne!(wanted, compiled, "another variant");
     let variant = || gpu.renderer.bin_variant(device, drawn.clone(), wanted).expect("the passes compile");

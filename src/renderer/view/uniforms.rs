@@ -3,73 +3,63 @@
 //! In: a prepared view, its instances, its parameters and the environment map. Out: the uniform buffers of the frame, of the parts of its
 //! instances and of its motions.
 
-use super::parameters::{Instance, ViewParameters};
+use super::parameters::ViewParameters;
+use super::view_design::Preparation;
 use super::view_renderer::ViewRenderer;
 use crate::renderer::active::drawn_count;
-use crate::renderer::layout::{self, INSTANCE_STRIDE};
-use crate::renderer::tile_bins::per_thread;
+use crate::renderer::layout::{self, FrameUniforms, INSTANCE_STRIDE, InstanceUniforms};
 use crate::view::{Appearance, Background, View, tiles};
+use glam::{Mat4, Vec2, Vec4};
 
 impl ViewRenderer {
-    pub(super) fn write_uniforms(
-        &mut self,
-        queue: &wgpu::Queue,
-        instances: &[Instance<'_>],
-        parameters: &ViewParameters<'_>,
-        environment: Option<(View, Appearance, [u32; 2])>,
-    ) {
-        let mut uniforms = std::mem::take(&mut self.instance_uniforms);
+    /// Writes the uniforms of the parts of instances.
+    pub(super) fn write_instances(&mut self, frame: &Preparation<'_>, parameters: &ViewParameters<'_>) {
+        let Self { resources: Some(made), instance_uniforms: uniforms, design, .. } = self else { return };
         uniforms.clear();
-        let Some(made) = &self.resources else { return };
-        let mut slot = 0;
-        let mut index = 0;
-        for instance in instances {
+        let (mut slot, mut index) = (0, 0);
+        for instance in frame.instances {
             let ViewParameters { blend_space, debug, .. } = *parameters;
-            let view = layout::InstanceUniforms::new(&instance.view, &instance.appearance, blend_space, debug);
-            let capture = instance.capture.instance(&view);
-            let mut first_listed = 0;
-            for part in 0..instance.capture.parts.len() {
-                let count = drawn_count(instance.capture, part, instance.active);
-                let listed = u32::from(instance.active.is_some());
-                let binning = self.bins.uniform(&made.sizes, self.picture, index);
-                let per_thread = per_thread(count);
-                let uniform = layout::InstanceUniforms {
-                    first_slot: slot,
-                    count,
-                    listed,
-                    first_listed,
-                    per_thread,
-                    binning,
-                    ..capture
-                };
-                uniforms.extend_from_slice(bytemuck::bytes_of(&uniform));
+            let capture = instance.capture;
+            let seen = capture.settings.in_view(&instance.view, &instance.appearance, blend_space, debug);
+            let listed = u32::from(instance.active.is_some());
+            let mut own = InstanceUniforms { listed, middle: capture.middle(seen.camera_z), ..seen };
+            for part in 0..capture.parts.len() {
+                own.first_slot = slot;
+                own.count = drawn_count(capture, part, instance.active);
+                (own.per_thread, own.binning) = design.of_part(index, own.count);
+                uniforms.extend_from_slice(bytemuck::bytes_of(&own));
                 uniforms.resize(uniforms.len().next_multiple_of(INSTANCE_STRIDE as usize), 0);
-                slot += count;
-                first_listed += count;
+                slot += own.count;
+                own.first_listed += own.count;
                 index += 1;
             }
         }
-        queue.write_buffer(&made.instances, 0, &uniforms);
-        let (mode, color) = match (parameters.background, environment) {
+        frame.queue.write_buffer(&made.instances, 0, uniforms);
+    }
+
+    /// Writes the uniforms of a frame, and of its motions.
+    pub(super) fn write_frame(&self, frame: &Preparation<'_>, parameters: &ViewParameters<'_>) {
+        let Preparation { queue, instances, .. } = *frame;
+        let around = instances.iter().find_map(|i| Some((i.view, i.appearance, i.capture.environment.as_ref()?.size)));
+        let (mode, color) = match (parameters.background, around) {
             (Background::Color(color), _) => (layout::BACKGROUND_COLOR, color),
-            (Background::Environment, Some((view, ..))) if !view.orthographic => {
-                (layout::BACKGROUND_ENVIRONMENT, [0.0; 3])
+            (Background::Environment, Some((view, appearance, _))) if !view.orthographic => {
+                (layout::BACKGROUND_ENVIRONMENT, appearance.light.to_array())
             }
             _ => (layout::BACKGROUND_NONE, [0.0; 3]),
         };
-        let (view, appearance, environment_size) = environment.unwrap_or_else(|| {
-            let view = View::new(self.picture, 0.0, glam::Mat4::IDENTITY, glam::Vec4::ONE, glam::Vec2::ONE);
+        let (view, appearance, environment_size) = around.unwrap_or_else(|| {
+            let view = View::new(self.picture, 0.0, Mat4::IDENTITY, Vec4::ONE, Vec2::ONE);
             (instances.first().map_or(view, |instance| instance.view), Appearance::default(), [0; 2])
         });
-        let color = if mode == layout::BACKGROUND_ENVIRONMENT { appearance.light.to_array() } else { color };
         let to_world = view.world_to_camera.inverse();
         let column = |axis: usize| to_world.col(axis).truncate().extend(view.camera_position[axis]).to_array();
         let opaque = parameters.opaque.as_ref();
-        let frame = layout::FrameUniforms {
+        let uniforms = FrameUniforms {
             size: self.picture.to_array(),
             tiles: tiles(self.picture).to_array(),
             slots: self.slots,
-            pair_capacity: made.sizes.pairs,
+            pair_capacity: self.pair_capacity(),
             background_mode: mode,
             opaque_samples: opaque.map_or(0, |depth| depth.samples),
             // With opaque depth the picture is composited later: the environment map must hide the surfaces behind it.
@@ -86,12 +76,11 @@ impl ViewRenderer {
             // A depth of two capture units.
             debug_depth: 2.0 * view.world_to_camera.row(2).truncate().length(),
             environment_opacity: appearance.opacity.clamp(0.0, 1.0),
-            binning: self.bins.uniform(&made.sizes, self.picture, 0),
+            binning: self.design.of_part(0, 0).1,
         };
-        queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));
+        queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&uniforms));
         if let Some(motion) = &self.motion {
-            motion.write(queue, &frame, instances, parameters.previous.unwrap_or_default());
+            motion.write(frame, &uniforms, parameters.previous.unwrap_or_default());
         }
-        self.instance_uniforms = uniforms;
     }
 }

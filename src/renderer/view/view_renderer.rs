@@ -4,17 +4,29 @@
 
 use super::motion::MotionResources;
 use super::readback::Readback;
-use super::resources::{DesignBuffers, Resources};
+use super::resources::Resources;
+use super::view_design::ViewDesign;
 use crate::renderer::design::Design;
-use crate::renderer::global_sort::{AtOnce, FinishedFrame};
-use crate::renderer::layout::{self, BIN_COUNTERS, Counters};
+use crate::renderer::global_sort::{FinishedFrame, GlobalSort};
+use crate::renderer::layout::{self, Counters};
 use crate::renderer::pipelines::Renderer;
-use crate::renderer::shaders::Pixels;
 use crate::renderer::statistics::ViewStatistics;
-use crate::renderer::tile_bins::{BinRoom, BinState};
+use crate::renderer::tile_bins::TileBins;
 use crate::renderer::timing::PassTimer;
 use glam::UVec2;
+use std::any::Any;
 use wgpu::{BufferUsages, TextureFormat};
+
+/// The last timed passes of a design: only frames with motions have them.
+const MOTION_PASSES: usize = 2;
+
+/// Returns a design at work for a view, without buffers.
+fn begun(design: Design) -> Box<dyn ViewDesign> {
+    match design {
+        Design::GlobalSort => Box::<GlobalSort>::default(),
+        Design::Auto | Design::TileBins => Box::<TileBins>::default(),
+    }
+}
 
 /// Working buffers, uniforms and targets of one view.
 #[derive(Debug)]
@@ -22,25 +34,17 @@ pub struct ViewRenderer {
     /// Number of slots of the frame prepared last, and the size of its picture.
     pub(super) slots: u32,
     pub(super) picture: UVec2,
-    /// The design as set, and the design of the frame prepared last, which is never [`Design::Auto`].
+    /// The design as set, and the design of the frame prepared last.
     pub(super) wanted: Design,
-    pub(super) design: Design,
-    /// Number of splats that `blend` blends at once.
-    pub(super) at_once: AtOnce,
+    pub(in crate::renderer) design: Box<dyn ViewDesign>,
     /// Whether the client checks each frame with [`must_draw_again`](Self::must_draw_again), and whether a frame had to be drawn again.
     pub(in crate::renderer) draws_again: bool,
     pub(super) crowded: bool,
     /// Number of releases of the buffers, and the value that it had when the counters that are read back were copied.
     pub(super) generation: u32,
     pub(super) copied_from: u32,
-    /// The tile bins.
-    pub(super) bins: BinState,
-    /// Whether the frame prepared last has been recorded.
-    pub(super) recorded: bool,
-    /// The variant of the pixel passes in the frame prepared last.
-    pub(super) pixels: Pixels,
+    /// Whether the frame prepared last has depths, and whether colors of splats are computed.
     pub(super) has_depths: bool,
-    /// Whether colors of splats are computed.
     pub(super) has_colors: bool,
     /// Number of pairs that earlier frames need, and whether a frame exceeded the limits of the device.
     pub(super) pairs_wanted: u32,
@@ -72,14 +76,11 @@ impl ViewRenderer {
             slots: 0,
             picture: UVec2::ONE,
             wanted: Design::Auto,
-            design: renderer.resolve(Design::Auto),
-            at_once: AtOnce::default(),
+            design: begun(renderer.resolve(Design::Auto)),
             draws_again: false,
             crowded: false,
             generation: 0,
             copied_from: 0,
-            bins: BinState::default(),
-            recorded: false,
             pairs_wanted: 0,
             short_of_room: false,
             oversized_frames: 0,
@@ -90,7 +91,6 @@ impl ViewRenderer {
             readback: Readback::new(allocator, "gs4d counter readback", counters),
             statistics: ViewStatistics::default(),
             timing: None,
-            pixels: Pixels::default(),
             has_depths: true,
             has_colors: true,
             resources: None,
@@ -146,7 +146,7 @@ impl ViewRenderer {
     /// [`Design::GlobalSort`]: if the design is [`Design::Auto`], frames of more than 2²⁴ splats; on software drivers, frames of too many splats
     /// in a bin.
     pub fn design(&self) -> Design {
-        self.design
+        self.design.design()
     }
 
     /// Returns counts and times of the view.
@@ -168,7 +168,8 @@ impl ViewRenderer {
     /// has other buffers.
     pub fn finished(&self) -> Option<FinishedFrame<'_>> {
         let made = self.resources.as_ref()?;
-        let DesignBuffers::GlobalSort(sort) = &made.buffers else { return None };
+        let design: &dyn Any = &*self.design;
+        let sort = design.downcast_ref::<GlobalSort>()?.buffers.as_ref()?;
         Some(FinishedFrame {
             frame: &self.frame,
             instances: &made.instances,
@@ -185,37 +186,25 @@ impl ViewRenderer {
     /// quarters of the capacities, within the limits of the device.
     pub(crate) fn make_room(&mut self, counters: &Counters) {
         // Counts from before the release of the buffers are ignored.
-        let Some(made) = self.resources.as_ref().map(|made| made.sizes) else { return };
+        let Some(made) = &self.resources else { return };
         // The buffers grow before they are full, since counts arrive some frames late.
-        let pairs = self.pair_count(counters);
-        if pairs > made.pairs / 4 * 3 {
+        let pairs = self.design.pair_count(counters);
+        if pairs > made.sizes.pairs / 4 * 3 {
             self.pairs_wanted = pairs.saturating_add(pairs / 2);
         }
-        if self.design == Design::TileBins {
-            self.bins.note(&made, self.picture, counters);
-        }
+        self.design.note(counters);
     }
 
-    /// Makes the next [`prepare`](Self::prepare) allocate the capacities of another view, or the larger capacities that the other view's next
+    /// Makes the first [`prepare`](Self::prepare) allocate the capacities of another view, or the larger capacities that the other view's next
     /// `prepare` allocates.
     pub(crate) fn make_room_of(&mut self, other: &Self) {
-        let made = other.resources.as_ref().map(|made| made.sizes).unwrap_or_default();
-        self.pairs_wanted = other.pairs_wanted.max(made.pairs);
-        let entries = if other.bins.variant.counted { 0 } else { made.entries };
-        self.bins.room = BinRoom::of(&other.bins.room, entries);
+        self.pairs_wanted = other.pairs_wanted.max(other.pair_capacity());
+        self.design = other.design.another();
     }
 
     /// Returns the capacity in pairs.
     pub(crate) fn pair_capacity(&self) -> u32 {
         self.resources.as_ref().map_or(0, |made| made.sizes.pairs)
-    }
-
-    /// Returns the number of pairs of a frame with these counters, written or not.
-    pub(crate) fn pair_count(&self, counters: &Counters) -> u32 {
-        match self.design {
-            Design::Auto | Design::TileBins => counters.pairs,
-            Design::GlobalSort => counters.pairs_wanted,
-        }
     }
 
     /// Returns whether the newest frame whose counters have arrived had more pairs, or splats in its bins, than the limits of this device
@@ -227,35 +216,24 @@ impl ViewRenderer {
     /// Frees the working buffers and targets; the next [`prepare`](Self::prepare) creates them again.
     pub fn release(&mut self) {
         self.crowded = false;
-        self.free();
+        self.begin_design(self.design());
     }
 
-    /// Frees the working buffers and targets. Counters of earlier frames are ignored when they arrive.
-    pub(super) fn free(&mut self) {
+    /// Draws with a design from the next frame on: frees the working buffers and targets. Counters of earlier frames are ignored when they
+    /// arrive.
+    pub(super) fn begin_design(&mut self, design: Design) {
+        self.design = begun(design);
         self.generation = self.generation.wrapping_add(1);
         self.resources = None;
         self.motion = None;
         self.pairs_wanted = 0;
         self.short_of_room = false;
-        self.bins.room = BinRoom::default();
-        self.bins.fullest = 0;
-        self.bins.visible = u32::MAX;
         self.statistics = ViewStatistics::default();
     }
 
     /// Returns the names of the passes that are timed.
-    pub(super) fn timed_passes(&self) -> &'static [&'static str] {
-        self.design.timed_passes(self.motion.is_some())
-    }
-
-    /// Returns the buffer of the counters of the frame prepared last, and their offset in bytes; `None` before the first
-    /// [`prepare`](Self::prepare).
-    pub(in crate::renderer) fn counters(&self) -> Option<(&wgpu::Buffer, u64)> {
-        let first = u64::from(BIN_COUNTERS) * 4 - size_of::<Counters>() as u64;
-        self.resources.as_ref().map(|made| match &made.buffers {
-            // `sort_bins` writes them into the buffer of the next frame's counters.
-            DesignBuffers::TileBins(bins) => (&bins.bins[1 - self.bins.parity()], first),
-            DesignBuffers::GlobalSort(sort) => (&sort.counters, 0),
-        })
+    pub(in crate::renderer) fn timed_passes(&self) -> &'static [&'static str] {
+        let all = self.design.timed_passes();
+        if self.motion.is_some() { all } else { &all[..all.len() - MOTION_PASSES] }
     }
 }
