@@ -119,7 +119,7 @@ fn app(
     let lens = Projection::Perspective(PerspectiveProjection { fov: 0.53, ..default() });
     let camera = app.world_mut().spawn((Camera3d::default(), msaa, lens, eye)).id();
     if let Some(design) = design {
-        app.add_plugins(GaussianCapturePlugin);
+        app.add_plugins(GaussianCapturePlugins);
         let handle = app.world().resource::<AssetServer>().load(arguments.capture.clone());
         app.world_mut().spawn(GaussianCapture3d(handle));
         app.world_mut().entity_mut(camera).insert(CaptureViewSettings { design, ..default() });

@@ -72,7 +72,7 @@ fn main() -> Result {
     let log =
         LogPlugin { level: Level::DEBUG, filter: "warn,bevy_gs4d=debug".into(), custom_layer: stopwatch, ..default() };
     let mut app = testing::app_with(UVec2::new(64, 64), |plugins| plugins.set(log));
-    app.add_plugins(GaussianCapturePlugin);
+    app.add_plugins(GaussianCapturePlugins);
     let handle = app.world().resource::<AssetServer>().load(capture.clone());
     app.world_mut().spawn(GaussianCapture3d(handle));
     app.world_mut().spawn((Camera3d::default(), Msaa::Off, Transform::from_xyz(0.0, 0.5, 4.0)));

@@ -15,6 +15,7 @@ mod common;
 
 use bevy::light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap};
 use bevy::prelude::*;
+use bevy_gs4d::pbr::{CastsShadows, ShadowResolution};
 use bevy_gs4d::prelude::*;
 use common::{Arguments, Times};
 
@@ -154,7 +155,7 @@ fn passes(app: &mut App, frames: u32) -> Result<Passes> {
 /// Returns an app with a camera and a scene. All assets are loaded.
 fn app(arguments: &Arguments, logged: bool, kind: Kind, msaa: Msaa) -> Result<App> {
     let mut app = common::app(arguments.size, logged, |plugins| plugins);
-    app.add_plugins(GaussianCapturePlugin).insert_resource(DirectionalLightShadowMap { size: 1024 });
+    app.add_plugins(GaussianCapturePlugins).insert_resource(DirectionalLightShadowMap { size: 1024 });
     let place = Transform::from_xyz(-3.0, 1.6, 2.0).looking_at(Vec3::ZERO, Vec3::Y);
     let camera = app.world_mut().spawn((Camera3d::default(), msaa, place)).id();
     let world = app.world_mut();

@@ -17,6 +17,7 @@ mod island;
 
 use bevy::ecs::world::EntityWorldMut;
 use bevy::prelude::*;
+use bevy_gs4d::renderer::silence_wayland;
 use bevy_gs4d::testing::{self, Film, Filmed, HoldOut, Rig};
 use std::io::Write;
 
@@ -26,6 +27,8 @@ const SOURCE: &str = include_str!("film.rs");
 const GRID: UVec2 = UVec2::new(7, 3);
 
 fn main() -> Result {
+    // On a server without a session nothing is printed about that.
+    silence_wayland();
     let (mut folder, [mut cameras, mut times], mut size) = (None, [32, 96], UVec2::splat(800));
     let (mut is_grid, mut test_at) = (false, None);
     let mut arguments = std::env::args().skip(1);

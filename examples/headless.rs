@@ -13,7 +13,7 @@ use bevy::prelude::*;
 use bevy_gs4d::Upright;
 use bevy_gs4d::asset::GaussianCapture;
 use bevy_gs4d::playback::Playback;
-use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin, testing};
+use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugins, testing};
 use common::Orbit;
 use common::arguments::{Arguments, parse, value};
 use std::f32::consts::TAU;
@@ -35,7 +35,7 @@ fn main() -> Result {
     })?;
 
     let mut app = testing::app(size);
-    app.add_plugins(GaussianCapturePlugin)
+    app.add_plugins(GaussianCapturePlugins)
         .insert_resource(ClearColor(Color::BLACK))
         .insert_resource(Capture(common::asset_path(&arguments.file)))
         .add_systems(Startup, setup)
@@ -69,11 +69,12 @@ fn orbit(
     captures: Res<Assets<GaussianCapture>>,
     mut orbit: Local<Option<Orbit>>,
     capture: Single<(&GaussianCapture3d, &Playback)>,
-    mut camera: Single<&mut Transform, With<Camera3d>>,
+    camera: Single<(&mut Transform, &mut Projection), With<Camera3d>>,
 ) {
     let (handle, playback) = capture.into_inner();
     let Some(loaded) = captures.get(&handle.0) else { return };
     let turn = playback.time / loaded.duration_seconds().max(f32::MIN_POSITIVE);
     let orbit = *orbit.get_or_insert_with(|| Orbit::around(loaded));
-    **camera = Orbit { yaw: orbit.yaw + TAU * turn, ..orbit }.transform();
+    let (mut transform, mut projection) = camera.into_inner();
+    Orbit { yaw: orbit.yaw + TAU * turn, ..orbit }.place(&mut transform, &mut projection);
 }

@@ -14,7 +14,7 @@ mod show;
 
 use bevy::prelude::*;
 use bevy_gs4d::Upright;
-use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin};
+use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugins};
 use std::path::PathBuf;
 
 /// The asset path of the capture on the command line.
@@ -33,8 +33,8 @@ fn setup(mut commands: Commands, assets: Res<AssetServer>, capture: Res<Capture>
 }
 
 fn main() -> Result {
-    // In a game: `App::new().add_plugins((DefaultPlugins, GaussianCapturePlugin)).add_systems(Startup, setup).run()`.
+    // In a game: `App::new().add_plugins((DefaultPlugins, GaussianCapturePlugins)).add_systems(Startup, setup).run()`.
     show::run(UVec2::new(640, 360), |app, capture| {
-        app.insert_resource(Capture(capture)).add_plugins(GaussianCapturePlugin).add_systems(Startup, setup);
+        app.insert_resource(Capture(capture)).add_plugins(GaussianCapturePlugins).add_systems(Startup, setup);
     })
 }

@@ -37,7 +37,7 @@ use bevy_gs4d::inspector::{Inspector, InspectorPlugin};
 use bevy_gs4d::picker::CapturePicker;
 use bevy_gs4d::playback::Playback;
 use bevy_gs4d::testing::{self, Offscreen};
-use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin};
+use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugins};
 use common::Orbit;
 use controls::{follow, mouse};
 use drop::drop_file;
@@ -86,7 +86,7 @@ fn main() -> Result {
 
 /// Adds the scene, with or without a window.
 fn scene(app: &mut App, capture: Capture) {
-    app.add_plugins(GaussianCapturePlugin)
+    app.add_plugins(GaussianCapturePlugins)
         .insert_resource(capture)
         .insert_resource(ClearColor(Color::srgb(0.06, 0.06, 0.08)))
         .add_systems(Startup, setup)

@@ -14,6 +14,7 @@ mod show;
 
 use bevy::light::CascadeShadowConfigBuilder;
 use bevy::prelude::*;
+use bevy_gs4d::pbr::{CastsShadows, ReceivesShadows, ShadowResolution};
 use bevy_gs4d::prelude::*;
 use std::path::PathBuf;
 
@@ -77,6 +78,6 @@ fn spawn_scene(
 fn main() -> Result {
     show::run(UVec2::new(800, 450), |app, capture| {
         app.insert_resource(Capture(capture)).insert_resource(ClearColor(HAZE));
-        app.add_plugins(GaussianCapturePlugin).add_systems(Startup, (spawn_capture, spawn_scene));
+        app.add_plugins(GaussianCapturePlugins).add_systems(Startup, (spawn_capture, spawn_scene));
     })
 }

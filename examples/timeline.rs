@@ -25,7 +25,7 @@ use bevy::core_pipeline::tonemapping::Tonemapping;
 use bevy::prelude::*;
 use bevy_egui::input::{egui_wants_any_keyboard_input, egui_wants_any_pointer_input};
 use bevy_egui::{EguiContexts, EguiPlugin, EguiPrimaryContextPass, egui};
-use bevy_gs4d::playback::PlaybackSystems;
+use bevy_gs4d::playback::{MarkerReached, PlaybackSystems, Timeline, TimelinePlayer, TimelineTrack};
 use bevy_gs4d::prelude::*;
 use bevy_gs4d::testing;
 use chart::Chart;
@@ -83,7 +83,7 @@ fn main() -> Result {
 
 /// Adds the scene, with or without a window.
 fn scene(app: &mut App, show: Show) {
-    app.add_plugins(GaussianCapturePlugin)
+    app.add_plugins(GaussianCapturePlugins)
         .insert_resource(show)
         .init_resource::<LastMarker>()
         .insert_resource(ClearColor(Color::srgb(0.06, 0.06, 0.08)))

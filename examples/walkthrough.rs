@@ -42,7 +42,7 @@ use bevy_gs4d::asset::GaussianCapture;
 use bevy_gs4d::scene::Bounds;
 use bevy_gs4d::stereo::{EyeTargets, StereoRig, spawn_stereo};
 use bevy_gs4d::testing::{self, Offscreen};
-use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin};
+use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugins};
 use body::{Body, EYE_HEIGHT, Head, Moves, START};
 use comfort::{Comfort, ComfortPlugin, EyeView};
 use path::{HeadPath, PathPlayer, Recorder};
@@ -109,7 +109,7 @@ fn main() -> Result {
 
 /// Adds the scene, with or without a window, and the path. `playing`: whether the path is followed from the start.
 fn scene(app: &mut App, capture: Capture, path: HeadPath, playing: bool) {
-    app.add_plugins((GaussianCapturePlugin, ComfortPlugin))
+    app.add_plugins((GaussianCapturePlugins, ComfortPlugin))
         .insert_resource(capture)
         .insert_resource(path)
         .insert_resource(PathPlayer { playing, seconds: 0.0 })
@@ -184,7 +184,7 @@ fn arrange(
     let Some(loaded) = captures.get(&handle.0).filter(|_| !*arranged) else { return };
     *arranged = true;
     let Some(core) = Bounds::core(loaded.scene().iter()) else { return };
-    let (turn, scale) = (loaded.upright(), CAPTURE_RADIUS / core.radius().max(1e-3));
+    let (turn, scale) = (loaded.upright(), CAPTURE_RADIUS / core.radius().max(1e-9));
     let [low, high] = [core.min, core.max].map(|corner| turn * corner * scale);
     let center = (low + high) / 2.0;
     let place = -Vec3::new(center.x, low.y.min(high.y), center.z);

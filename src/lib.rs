@@ -122,6 +122,33 @@
 //! head two eyes. [`inspector`] is a panel that shows and changes all of this, [`testing`] renders an app to pictures without a window.
 //! The guide, `docs/guide.md`, goes through them in the order in which a game meets them.
 //!
+//! [`GaussianCapturePlugins`] are a group: `GaussianCapturePlugins.build().disable::<CapturePbrPlugin>()` leaves a part out. All components
+//! and resources are reflected and registered, by their public paths, so that scene files can name them.
+//!
+//! | component | on | inserted by |
+//! |---|---|---|
+//! | [`GaussianCapture3d`] | a capture in the world | the game |
+//! | [`CaptureState`](asset::CaptureState), [`Playback`](playback::Playback), [`CaptureSettings`](render::CaptureSettings) | captures; `Playback` also timelines | the plugins, unless the game does |
+//! | [`Upright`] | captures | the game; [`UprightTurn`] comes with it |
+//! | [`Markers`](playback::Markers), [`FollowsClock`](playback::FollowsClock) | captures; `FollowsClock` also timelines | the game |
+//! | [`PlaybackClock`](playback::PlaybackClock) | an entity of its own; timelines | the game; the plugins on timelines |
+//! | [`TimelinePlayer`](playback::TimelinePlayer) | a timeline in the world | the game |
+//! | [`TimelineTrack`](playback::TimelineTrack), [`ClipFade`](playback::ClipFade) | children of timelines | the plugins, or the game |
+//! | [`CastsShadows`](pbr::CastsShadows), [`ReceivesShadows`](pbr::ReceivesShadows), [`CaptureLight`](pbr::CaptureLight), [`CaptureContactShadow`](pbr::CaptureContactShadow) | captures | the game |
+//! | [`CaptureViewSettings`](render::CaptureViewSettings), [`CapturePickingCamera`](picking_backend::CapturePickingCamera) | cameras | the game |
+//! | [`StereoRig`](stereo::StereoRig) | a head | [`spawn_stereo`](stereo::spawn_stereo) |
+//! | [`Eye`](stereo::Eye), [`SideBySide`](stereo::SideBySide) | cameras of a head | [`spawn_stereo`](stereo::spawn_stereo) |
+//!
+//! | set of systems | schedule | what its systems do |
+//! |---|---|---|
+//! | [`CaptureAssetSystems`](asset::CaptureAssetSystems) | `PreUpdate`, after Bevy's `AssetTrackingSystems` | turn captures upright, update their states and send [`CaptureReady`](asset::CaptureReady) and [`CaptureFailed`](asset::CaptureFailed) |
+//! | Bevy's `PickingSystems::Backend` | `PreUpdate` | find the captures under pointers |
+//! | [`PlaybackSystems::Clocks`](playback::PlaybackSystems::Clocks) | `Update` | advance clocks |
+//! | [`PlaybackSystems::Timelines`](playback::PlaybackSystems::Timelines) | `Update`, after `Clocks` | advance timelines, set up their tracks |
+//! | [`PlaybackSystems::Advance`](playback::PlaybackSystems::Advance) | `Update`, after `Timelines` | advance captures; send the messages about playing |
+//! | Bevy's `VisibilitySystems::CalculateBounds` | `PostUpdate` | update the `Aabb` of captures |
+//! | [`CaptureSystems`](render::CaptureSystems) | `Core3d`, in the render world | draw captures into the target of a camera |
+//!
 //! # From a checkpoint to a small capture
 //!
 //! [`offline`] finds what each Gaussian is worth to the training views ([`mod@offline::score`]), which stay (`offline::prune`),
@@ -151,6 +178,7 @@
 //! | `testing` | [`testing`]: Bevy apps without a window, drawn into pictures | `bevy` |
 //! | `viewer` | what the examples need: a window, lit meshes | `pbr`, `picking`, `inspector`, `testing` |
 //! | `openxr` | the example `walkthrough` for a headset, untried | `viewer` |
+#![cfg_attr(docsrs, feature(doc_cfg))]
 #![cfg_attr(
     not(all(feature = "cli", feature = "inspector", feature = "testing")),
     expect(rustdoc::broken_intra_doc_links, reason = "this page describes modules that are not part of this build")

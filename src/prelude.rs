@@ -1,7 +1,11 @@
 //! The names that a game needs, to be imported beside Bevy's own: `use bevy_gs4d::prelude::*;`.
 //!
-//! In: the modules of the plugin. Out: in their order, the plugin, the capture and its component, messages, playback, settings, picking
-//! and stereo.
+//! In: the modules of the plugin. Out: in their order, the plugins, the capture and its component, messages, playback, settings and picking.
+//!
+//! Other crates export everything at once, too. Every name of this prelude therefore begins with `Capture`, `Gaussian` or `Playback`, except
+//! `Upright`. Shorter names stay in their modules: `Repeat`, `Markers`, `FollowsClock`, `MarkerReached` and timelines in
+//! [`playback`](crate::playback), `CropBox` and `DepthWrite` in [`render`](crate::render), shadows in `pbr`, eyes in
+//! [`stereo`](crate::stereo), `BlendSpace` and `DebugView` in [`view`](crate::view).
 //!
 //! ```no_run
 //! use bevy::prelude::*;
@@ -17,19 +21,19 @@
 //! }
 //!
 //! let mut app = App::new();
-//! app.add_plugins((DefaultPlugins, GaussianCapturePlugin));
+//! app.add_plugins((DefaultPlugins, GaussianCapturePlugins));
 //! app.add_systems(Startup, (setup, slow_motion).chain()).run();
 //! ```
 
 #[doc(no_inline)]
-pub use crate::plugin::GaussianCapturePlugin;
+pub use crate::plugin::GaussianCapturePlugins;
 #[doc(no_inline)]
-pub use crate::plugin::asset::{CaptureFailed, CaptureReady, CaptureState};
+pub use crate::plugin::asset::{CaptureFailed, CaptureFailure, CaptureReady, CaptureState};
 #[doc(no_inline)]
 pub use crate::plugin::component::{GaussianCapture, GaussianCapture3d, Upright};
 #[cfg(feature = "pbr")]
 #[doc(no_inline)]
-pub use crate::plugin::pbr::{CaptureContactShadow, CaptureLight, CastsShadows, ReceivesShadows, ShadowResolution};
+pub use crate::plugin::pbr::{CaptureContactShadow, CaptureLight};
 #[doc(no_inline)]
 pub use crate::plugin::picker::{CaptureHit, CapturePicker};
 #[cfg(feature = "picking")]
@@ -37,14 +41,9 @@ pub use crate::plugin::picker::{CaptureHit, CapturePicker};
 pub use crate::plugin::picking_backend::{CapturePickingCamera, CapturePickingSettings};
 #[doc(no_inline)]
 pub use crate::plugin::playback::{
-    FollowsClock, MarkerReached, Markers, Playback, PlaybackClock, PlaybackEnded, PlaybackLooped, PlaybackPaused,
-    PlaybackSeeked, PlaybackStarted, Repeat, SegmentBoundCrossed, Timeline, TimelinePlayer, TimelineTrack,
+    Playback, PlaybackClock, PlaybackEnded, PlaybackLooped, PlaybackPaused, PlaybackSeeked, PlaybackStarted,
 };
 #[doc(no_inline)]
 pub use crate::plugin::render::{
-    CaptureDetail, CaptureSettings, CaptureStatistics, CaptureUploadBudget, CaptureViewSettings, CropBox, DepthWrite,
+    CaptureDetail, CaptureSettings, CaptureStatistics, CaptureUploadBudget, CaptureViewSettings,
 };
-#[doc(no_inline)]
-pub use crate::plugin::stereo::{Eye, EyeTargets, StereoPlugin, StereoRig, spawn_stereo};
-#[doc(no_inline)]
-pub use crate::view::{BlendSpace, DebugView};

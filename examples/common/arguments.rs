@@ -5,6 +5,7 @@
 
 use bevy::asset::io::file::FileAssetReader;
 use bevy::prelude::*;
+use bevy_gs4d::renderer::silence_wayland;
 use bevy_gs4d::testing;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -29,6 +30,8 @@ pub fn parse(
     defaults: Arguments,
     mut more: impl FnMut(&str, &mut dyn Iterator<Item = String>) -> Result<bool>,
 ) -> Result<Arguments> {
+    // On a server without a session nothing is printed about that.
+    silence_wayland();
     let mut parsed = defaults;
     let mut arguments = std::env::args().skip(1);
     let mut files = 0;

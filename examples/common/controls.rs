@@ -16,9 +16,9 @@ pub fn arguments(file: &str) -> Result<Arguments> {
 }
 
 /// Moves cameras to their positions on the orbit.
-pub fn follow(mut cameras: Query<(&Orbit, &mut Transform)>) {
-    for (orbit, mut transform) in &mut cameras {
-        *transform = orbit.transform();
+pub fn follow(mut cameras: Query<(&Orbit, &mut Transform, &mut Projection)>) {
+    for (orbit, mut transform, mut projection) in &mut cameras {
+        orbit.place(&mut transform, &mut projection);
     }
 }
 
@@ -34,5 +34,5 @@ pub fn mouse(
         orbit.pitch = (orbit.pitch + motion.delta.y * 0.006).clamp(-1.5, 1.5);
     }
     let notches = scroll.delta.y * if scroll.unit == MouseScrollUnit::Pixel { 0.01 } else { 1.0 };
-    orbit.distance = (orbit.distance * 0.9f32.powf(notches)).clamp(0.05, 1e4);
+    orbit.distance = (orbit.distance * 0.9f32.powf(notches)).clamp(1e-5, 1e7);
 }

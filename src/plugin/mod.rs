@@ -19,11 +19,11 @@
 //! * `inspector` (feature `inspector`): a panel that shows and edits captures
 //! * `testing` (feature `testing`): apps without a window, rendered to pictures
 //!
-//! [`GaussianCapturePlugin`] adds all of them to an app except the inspector, which has its own plugin. `picker` and `testing` need no
-//! plugin.
+//! [`GaussianCapturePlugins`] adds the plugins of all of them to an app except the inspector's. `picker` and `testing` have no plugin. The
+//! crate root has tables of the components and the sets of systems.
 
 pub mod asset;
-mod capture_plugin;
+mod capture_plugins;
 pub(crate) mod component;
 #[cfg(feature = "inspector")]
 pub mod inspector;
@@ -38,5 +38,5 @@ pub mod stereo;
 #[cfg(feature = "testing")]
 pub mod testing;
 
-pub use capture_plugin::GaussianCapturePlugin;
-pub use component::{GaussianCapture3d, Upright};
+pub use capture_plugins::GaussianCapturePlugins;
+pub use component::{GaussianCapture3d, Upright, UprightTurn};

@@ -7,7 +7,7 @@ use crate::support::event_log::{debug, take_events};
 use crate::support::playback_app::{app, capture, change, get, pass};
 use bevy::animation::{AnimatedBy, AnimationTargetId, animated_field};
 use bevy::prelude::*;
-use bevy_gs4d::playback::{Clip, Track};
+use bevy_gs4d::playback::{Clip, Timeline, TimelinePlayer, TimelineTrack, Track};
 use bevy_gs4d::prelude::*;
 
 /// Spawns a capture of four seconds, with its playback animated for two seconds.

@@ -14,7 +14,7 @@ use bevy_gs4d::playback::{Playback, Repeat};
 use bevy_gs4d::scene::{GaussianScene, RuntimeScene, Sliced};
 use bevy_gs4d::testing::{self, Offscreen, TestingError};
 use bevy_gs4d::view::Background;
-use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin, codec, reference};
+use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugins, codec, reference};
 use std::time::Duration;
 
 /// The color of boxes.
@@ -105,6 +105,23 @@ fn a_transform_moves_positions_and_shapes() {
     let expected = reference::render(&moved(&scene, &entity), &view(&eye(), SIZE, 0.0), BLACK).picture;
     let apart = difference(&picture, &expected);
     assert!(apart <= 2.0, "Bevy and the reference with transformed Gaussians differ by {apart} / 255");
+}
+
+#[test]
+fn a_small_capture_that_is_enlarged_has_the_near_limit_and_the_filter_that_it_was_trained_with() {
+    const SCALE: f32 = 100.0;
+    let Some(mut app) = app(SIZE) else { return };
+    let mut scene = moved(&crowd(), &Transform::from_scale(Vec3::splat(SCALE.recip())));
+    (scene.trained_with.near, scene.trained_with.mip_filter) = (0.002, true);
+    let entity = Transform::from_scale(Vec3::splat(SCALE));
+    spawn(&mut app, &scene, entity);
+    spawn_camera(&mut app, Msaa::Off, eye());
+    let picture = picture(&mut app, 0.0);
+    let view = view_of(&eye(), &entity, SIZE, 0.0).with_optics(scene.trained_with.optics());
+    let expected = reference::render(&scene, &view, BLACK).picture;
+    assert!(expected.pixels.iter().any(|pixel| pixel.max_element() > 0.3), "the capture is not behind its near limit");
+    let apart = difference(&picture, &expected);
+    assert!(apart <= 2.0, "Bevy and the CPU reference differ by {apart} / 255");
 }
 
 /// Returns the scene with every Gaussian transformed.
@@ -266,7 +283,7 @@ fn a_package_loads_from_a_folder_and_a_broken_one_is_an_error() {
 #[test]
 fn captures_play_in_an_app_without_a_renderer() {
     let mut app = App::new();
-    app.add_plugins((MinimalPlugins, AssetPlugin::default(), GaussianCapturePlugin));
+    app.add_plugins((MinimalPlugins, AssetPlugin::default(), GaussianCapturePlugins));
     let handle = app.world_mut().resource_mut::<Assets<GaussianCapture>>().add(GaussianCapture::new(crowd()));
     let entity = app.world_mut().spawn((GaussianCapture3d(handle), Playback::default())).id();
     app.insert_resource(bevy::time::TimeUpdateStrategy::ManualDuration(Duration::from_millis(100)));

@@ -15,13 +15,13 @@ use bevy::render::render_resource::{
 use bevy::render::renderer::RenderDevice;
 use bevy::render::settings::{Backends, RenderCreation, WgpuLimits, WgpuSettings};
 use bevy::render::{RenderApp, RenderPlugin};
-use bevy_gs4d::asset::{CaptureFailed, CaptureState, GaussianCapture};
+use bevy_gs4d::asset::{CaptureFailed, CaptureFailure, CaptureState, GaussianCapture};
 use bevy_gs4d::internal::plugin::CheckedPipelines;
 use bevy_gs4d::playback::Playback;
 use bevy_gs4d::render::CaptureStatistics;
 use bevy_gs4d::scene::RuntimeScene;
 use bevy_gs4d::testing::{self, Offscreen};
-use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin};
+use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugins};
 use image::RgbaImage;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -46,7 +46,7 @@ fn limited_app(adjust: impl FnOnce(&mut WgpuSettings, WgpuLimits)) -> Option<(Ap
             ..default()
         })
     });
-    app.add_plugins(GaussianCapturePlugin).insert_resource(ClearColor(Color::BLACK));
+    app.add_plugins(GaussianCapturePlugins).insert_resource(ClearColor(Color::BLACK));
     let camera = spawn_camera(&mut app, Msaa::Off, front());
     testing::settle(&mut app).expect("an app without captures draws without an error");
     Some((app, camera))
@@ -83,7 +83,7 @@ fn failures_of(app: &mut App) -> Arc<Mutex<Vec<CaptureFailed>>> {
 /// Returns the failures of an entity.
 fn about(failures: &Mutex<Vec<CaptureFailed>>, entity: Entity) -> Vec<String> {
     let failures = failures.lock().unwrap_or_else(PoisonError::into_inner);
-    failures.iter().filter(|failure| failure.entity == entity).map(|failure| failure.error.clone()).collect()
+    failures.iter().filter(|failure| failure.entity == entity).map(|failure| failure.error.to_string()).collect()
 }
 
 /// Runs frames.
@@ -119,7 +119,8 @@ fn a_capture_too_large_for_any_view_fails_and_the_old_capture_is_drawn() {
         "one failure with its remedy is sent: {said:?}"
     );
     let state = app.world().get::<CaptureState>(large).expect("a required component");
-    assert!(matches!(state, CaptureState::Failed(_)), "the large capture has failed: {state:?}");
+    let typed = matches!(state, CaptureState::Failed(CaptureFailure::TooLarge { .. }));
+    assert!(typed, "the large capture has failed for its size: {state:?}");
     assert!(is_red_in_the_middle(&read(&mut app)), "the first capture is still drawn");
     // A changed asset is rejected in the same way.
     let id = app.world().get::<GaussianCapture3d>(old).expect("still there").0.id();
@@ -169,6 +170,9 @@ fn a_device_that_refuses_a_layout_is_reported_and_the_app_goes_on() {
     assert!(why.contains("refused"), "the reason says that the GPU refused an object: {why}");
     let said = about(&failures, entity);
     assert!(matches!(&said[..], [one] if one.contains(&why)), "one failure with the reason is sent: {said:?}");
+    let state = app.world().get::<CaptureState>(entity).expect("a required component");
+    let typed = matches!(state, CaptureState::Failed(CaptureFailure::NoRenderer { .. }));
+    assert!(typed, "the capture has failed for want of a renderer: {state:?}");
 }
 
 /// Blends into a target of this format.

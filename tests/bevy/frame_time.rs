@@ -10,7 +10,7 @@ use bevy::prelude::*;
 use bevy::render::renderer::RenderDevice;
 use bevy::render::settings::{Backends, RenderCreation, WgpuFeatures, WgpuSettings};
 use bevy::render::{RenderApp, RenderPlugin};
-use bevy_gs4d::GaussianCapturePlugin;
+use bevy_gs4d::GaussianCapturePlugins;
 use bevy_gs4d::render::CaptureStatistics;
 use bevy_gs4d::testing;
 
@@ -29,7 +29,7 @@ fn a_device_without_timestamps_inside_passes_measures_the_whole_frame() {
             ..default()
         })
     });
-    app.add_plugins(GaussianCapturePlugin);
+    app.add_plugins(GaussianCapturePlugins);
     spawn(&mut app, &synthetic(500, 1, false), Transform::default());
     let eye = Transform::from_xyz(0.5, -3.0, 1.5).looking_at(Vec3::ZERO, Vec3::Z);
     let camera = spawn_camera(&mut app, Msaa::Off, eye);

@@ -17,7 +17,7 @@ use bevy_gs4d::codec::{self, ReadOptions};
 use bevy_gs4d::internal::codec::export::{EXPORTS, Export, Exporter};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{FilterKind, RuntimeScene, UpAxis};
-use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin};
+use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugins};
 use drop::drop_file;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -26,7 +26,7 @@ use std::path::{Path, PathBuf};
 fn app(folder: &Path) -> App {
     let file_path = folder.to_str().expect("temporary folders have plain names").into();
     let mut app = App::new();
-    app.add_plugins((MinimalPlugins, AssetPlugin { file_path, ..default() }, GaussianCapturePlugin));
+    app.add_plugins((MinimalPlugins, AssetPlugin { file_path, ..default() }, GaussianCapturePlugins));
     app
 }
 
@@ -129,7 +129,8 @@ fn a_file_that_is_no_capture_fails_with_the_reason() {
     let mut app = app(folder.path());
     for (name, part) in [("points.ply", "points"), ("text.spz", "neither")] {
         let (_, state) = loaded(&mut app, name, &ReadOptions::default());
-        let CaptureState::Failed(message) = state else { panic!("{name} is no capture") };
+        let CaptureState::Failed(failure) = state else { panic!("{name} is no capture") };
+        let message = failure.to_string();
         assert!(message.contains(name) && message.contains(part), "the message says why: {message}");
     }
 }
@@ -160,7 +161,7 @@ fn captures_of_every_format_are_shown_when_they_are_dropped_on_the_window() {
 
     let mut app = App::new();
     let assets = AssetPlugin { unapproved_path_mode: UnapprovedPathMode::Allow, ..default() };
-    app.add_plugins((MinimalPlugins, assets, GaussianCapturePlugin)).add_message::<FileDragAndDrop>();
+    app.add_plugins((MinimalPlugins, assets, GaussianCapturePlugins)).add_message::<FileDragAndDrop>();
     app.add_systems(Update, drop_file);
     let player = app.world_mut().spawn(GaussianCapture3d(Handle::default())).id();
     for path in files {

@@ -11,7 +11,7 @@ use bevy_gs4d::picker::{CaptureHit, CapturePicker};
 use bevy_gs4d::playback::{ClipFade, Playback};
 use bevy_gs4d::render::{CaptureSettings, CropBox};
 use bevy_gs4d::scene::{FilterKind, RuntimeScene, TemporalFilter};
-use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin};
+use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugins};
 use std::f32::consts::FRAC_PI_2;
 
 /// Returns a round Gaussian at `mean` with a standard deviation of 0.1.
@@ -35,7 +35,7 @@ fn scene(gaussians: &[Gaussian]) -> RuntimeScene {
 
 fn app() -> App {
     let mut app = App::new();
-    app.add_plugins((MinimalPlugins, AssetPlugin::default(), GaussianCapturePlugin));
+    app.add_plugins((MinimalPlugins, AssetPlugin::default(), GaussianCapturePlugins));
     app
 }
 

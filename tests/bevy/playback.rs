@@ -1,4 +1,4 @@
-//! Playback in Bevy apps: events, shared clocks, the game's time, and reflection of the components.
+//! Playback in Bevy apps: events, shared clocks, the game's time, and entities in components.
 //!
 //! In: captures of two seconds with key-frames every half second. Out: proof that times are right and that every change sends its event.
 //! Needs neither a GPU nor a window.
@@ -6,10 +6,9 @@
 use crate::support::event_log::{debug, take_events};
 use crate::support::playback_app::{app, capture, change, get, pass};
 use bevy::prelude::*;
-use bevy_gs4d::playback::{ClipFade, ClockSource};
+use bevy_gs4d::playback::{ClockSource, FollowsClock, MarkerReached, Markers, Repeat, SegmentBoundCrossed};
 use bevy_gs4d::prelude::*;
-use bevy_gs4d::stereo::SideBySide;
-use std::any::{TypeId, type_name};
+use std::any::TypeId;
 
 /// Spawns a capture of two seconds with five key-frames.
 fn spawn(app: &mut App, bundle: impl Bundle) -> Entity {
@@ -399,37 +398,6 @@ fn another_capture_on_the_same_entity_starts_at_the_current_time() {
     pass(&mut app, 0.25);
     let on = [crossed(entity, &[2]), crossed(follower, &[2])].concat();
     assert_eq!(take_events(&mut app), on, "the start events are sent once");
-}
-
-/// Returns the name of a component without reflection, which scenes, animations and inspectors need; `None` if it is registered.
-fn unknown<C: Component>(app: &App) -> Option<&'static str> {
-    let registry = app.world().resource::<AppTypeRegistry>().read();
-    registry.get_type_data::<ReflectComponent>(TypeId::of::<C>()).is_none().then(type_name::<C>)
-}
-
-#[test]
-fn components_are_known_to_reflection() {
-    let app = app("assets");
-    let unknown = [
-        unknown::<Playback>(&app),
-        unknown::<PlaybackClock>(&app),
-        unknown::<FollowsClock>(&app),
-        unknown::<Markers>(&app),
-        unknown::<Upright>(&app),
-        unknown::<CapturePickingCamera>(&app),
-        unknown::<TimelinePlayer>(&app),
-        unknown::<TimelineTrack>(&app),
-        unknown::<ClipFade>(&app),
-        unknown::<GaussianCapture3d>(&app),
-        unknown::<CaptureSettings>(&app),
-        unknown::<CaptureViewSettings>(&app),
-        unknown::<CaptureState>(&app),
-        unknown::<StereoRig>(&app),
-        unknown::<Eye>(&app),
-        unknown::<SideBySide>(&app),
-    ];
-    let unknown: Vec<_> = unknown.into_iter().flatten().collect();
-    assert_eq!(unknown, [""; 0], "all components are registered for reflection");
 }
 
 #[test]

@@ -12,7 +12,7 @@ use bevy::prelude::*;
 use bevy_gs4d::asset::{CaptureState, GaussianCapture};
 use bevy_gs4d::codec::package::{self, StoredForm};
 use bevy_gs4d::scene::RuntimeScene;
-use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin};
+use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugins};
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
@@ -58,7 +58,7 @@ impl Game {
             ..default()
         };
         let mut app = App::new();
-        app.add_plugins((MinimalPlugins, assets, GaussianCapturePlugin));
+        app.add_plugins((MinimalPlugins, assets, GaussianCapturePlugins));
         let log = FileTransactionLogFactory { file_path: self.path("log") };
         let processor = app.world().resource::<AssetProcessor>();
         processor.data().set_log_factory(Box::new(log)).expect("processing has not begun");

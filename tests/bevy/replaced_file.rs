@@ -14,7 +14,7 @@ use bevy_gs4d::asset::{CaptureReady, GaussianCapture};
 use bevy_gs4d::codec::package::WriteSettings;
 use bevy_gs4d::offline;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
-use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin};
+use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugins};
 use std::path::Path;
 
 fn write(path: &Path, count: usize) {
@@ -29,7 +29,7 @@ fn play_loads_a_capture_again_whose_file_is_replaced() {
     let mut app = App::new();
     // As in the example: captures may be anywhere.
     let assets = AssetPlugin { unapproved_path_mode: UnapprovedPathMode::Allow, ..default() };
-    app.add_plugins((MinimalPlugins, assets, GaussianCapturePlugin)).add_systems(Update, live::reload_changed);
+    app.add_plugins((MinimalPlugins, assets, GaussianCapturePlugins)).add_systems(Update, live::reload_changed);
     record::<CaptureReady>(&mut app, Update);
     let capture: Handle<GaussianCapture> = app.world().resource::<AssetServer>().load(file.clone());
     app.world_mut().spawn(GaussianCapture3d(capture.clone()));

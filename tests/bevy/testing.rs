@@ -18,7 +18,7 @@ use bevy_gs4d::asset::GaussianCapture;
 use bevy_gs4d::playback::{Clip, Playback, Timeline, TimelinePlayer, Track};
 use bevy_gs4d::render::CaptureUploadBudget;
 use bevy_gs4d::testing::{self, Offscreen, TestingError};
-use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin};
+use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugins};
 use std::time::Duration;
 
 /// The time steps and key states that systems have received.
@@ -130,10 +130,10 @@ fn errors_name_the_missing_plugin() {
     let mut without = App::new();
     without.add_plugins(MinimalPlugins).world_mut().spawn(GaussianCapture3d::default());
     let refused = testing::step(&mut without, Duration::ZERO).expect_err("captures without their plugin are an error");
-    assert!(refused.to_string().contains("GaussianCapturePlugin"), "{refused} names the missing plugin");
+    assert!(refused.to_string().contains("GaussianCapturePlugins"), "{refused} names the missing plugin");
 
     let mut unseen = App::new();
-    unseen.add_plugins((MinimalPlugins, AssetPlugin::default(), GaussianCapturePlugin));
+    unseen.add_plugins((MinimalPlugins, AssetPlugin::default(), GaussianCapturePlugins));
     for refused in [testing::settle(&mut unseen).err(), testing::picture(&mut unseen, Duration::ZERO).err()] {
         let expected = match refused {
             Some(TestingError::NoRenderer) => testing::has_gpu(),

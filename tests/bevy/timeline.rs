@@ -10,7 +10,10 @@ use bevy::asset::{AssetLoadFailedEvent, LoadState};
 use bevy::prelude::*;
 use bevy_gs4d::codec::package::WriteSettings;
 use bevy_gs4d::offline;
-use bevy_gs4d::playback::{Clip, ClipFade, Marker, Track};
+use bevy_gs4d::playback::{
+    Clip, ClipFade, FollowsClock, Marker, MarkerReached, Repeat, SegmentBoundCrossed, Timeline, TimelinePlayer,
+    TimelineTrack, Track,
+};
 use bevy_gs4d::prelude::*;
 use std::path::Path;
 

@@ -54,7 +54,7 @@ fn green() -> EffectAsset {
 /// Returns the picture of a capture and of a particle at `z`, seen from +z.
 fn seen(msaa: Msaa, hdr: bool, z: f32) -> RgbaImage {
     let mut app = testing::app(SIZE);
-    app.add_plugins((GaussianCapturePlugin, HanabiPlugin)).insert_resource(ClearColor(Color::BLACK));
+    app.add_plugins((GaussianCapturePlugins, HanabiPlugin)).insert_resource(ClearColor(Color::BLACK));
     let world = app.world_mut();
     let capture = world.resource_mut::<Assets<GaussianCapture>>().add(red());
     world.spawn(GaussianCapture3d(capture));

@@ -10,7 +10,7 @@ use bevy::log::{BoxedLayer, DEFAULT_FILTER, LogPlugin};
 use bevy::prelude::*;
 use bevy::render::RenderApp;
 use bevy::render::render_resource::{CachedPipelineState, PipelineCache};
-use bevy_gs4d::GaussianCapturePlugin;
+use bevy_gs4d::GaussianCapturePlugins;
 use bevy_gs4d::testing;
 use image::RgbaImage;
 use std::fmt::{Debug, Write};
@@ -31,7 +31,7 @@ pub fn app(size: UVec2) -> App {
     let mut app = testing::app_with(size, |plugins| {
         if HAS_LOG.swap(true, Ordering::Relaxed) { plugins.disable::<LogPlugin>() } else { plugins.set(log()) }
     });
-    app.add_plugins(GaussianCapturePlugin).insert_resource(ClearColor(Color::BLACK));
+    app.add_plugins(GaussianCapturePlugins).insert_resource(ClearColor(Color::BLACK));
     app
 }
 

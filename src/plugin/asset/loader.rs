@@ -31,6 +31,7 @@ const PIECE: f32 = 262_144.0;
 
 /// Why a capture could not be loaded.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum CaptureLoadError {
     /// The asset source could not deliver the bytes.
     #[error("the file could not be read: {0}")]
@@ -80,6 +81,7 @@ pub struct PackageLoaderSettings {
 
 /// Loads packages, `.gs4d`, as [`GaussianCapture`]s. Errors: [`CaptureLoadError`].
 #[derive(Debug, Default, TypePath)]
+#[type_path = "bevy_gs4d::asset"]
 pub struct PackageLoader;
 
 impl AssetLoader for PackageLoader {
@@ -111,11 +113,13 @@ impl AssetLoader for PackageLoader {
     }
 }
 
-/// Loads checkpoints of the original code, `.pth`, as [`GaussianCapture`]s. Errors: [`CaptureLoadError`].
+/// Loads checkpoints of the original code (`.pth`), of gsplat (`.pt`) and of nerfstudio (`.ckpt`) as [`GaussianCapture`]s. Errors:
+/// [`CaptureLoadError`].
 ///
 /// Values that the settings do not give are read from `cfg_args`, the file that the trainer writes into the same folder, if it exists.
 /// `cfg_args` is then a dependency of the checkpoint: when `cfg_args` changes, the checkpoint is loaded again.
 #[derive(Debug, Default, TypePath)]
+#[type_path = "bevy_gs4d::asset"]
 pub struct CheckpointLoader;
 
 impl AssetLoader for CheckpointLoader {
@@ -130,7 +134,11 @@ impl AssetLoader for CheckpointLoader {
         context: &mut LoadContext<'_>,
     ) -> Result<GaussianCapture, CaptureLoadError> {
         let cfg_args = read_cfg_args(context).await;
-        let scene = checkpoint::read(Cursor::new(bytes(reader).await?), settings, cfg_args.as_deref())?;
+        let bytes = Cursor::new(bytes(reader).await?);
+        let Imported { scene, lost } = checkpoint::read_stating(bytes, settings, cfg_args.as_deref())?;
+        for sentence in lost {
+            info!("{}: {sentence}", context.path().path().display());
+        }
         Ok(GaussianCapture::new(scene.into_runtime()?))
     }
 
@@ -165,6 +173,7 @@ impl AssetLoader for CheckpointLoader {
 /// # bevy::ecs::system::assert_is_system(setup);
 /// ```
 #[derive(Debug, Default, TypePath)]
+#[type_path = "bevy_gs4d::asset"]
 pub struct ImportLoader;
 
 impl AssetLoader for ImportLoader {

@@ -6,6 +6,7 @@
 //! They are sent in `PreUpdate`, in [`CaptureAssetSystems`](super::CaptureAssetSystems) and, for captures that the GPU cannot draw, after
 //! it: systems in `Update` read them in the same frame.
 
+use super::failure::CaptureFailure;
 use crate::plugin::component::GaussianCapture;
 use bevy::asset::AssetId;
 use bevy::ecs::entity::Entity;
@@ -63,8 +64,8 @@ pub struct CaptureReady {
 pub struct CaptureFailed {
     /// The entity with the capture.
     pub entity: Entity,
-    /// The file, its fault and, if there is one, the remedy.
-    pub error: String,
+    /// The reason. Its text names the file, the fault and, if there is one, the remedy.
+    pub error: CaptureFailure,
 }
 
 /// Sends the messages about loading.
@@ -80,7 +81,7 @@ impl Announcer<'_, '_> {
         send(&mut self.commands, &mut self.ready, CaptureReady { entity, capture });
     }
 
-    pub(crate) fn failed(&mut self, entity: Entity, error: String) {
+    pub(crate) fn failed(&mut self, entity: Entity, error: CaptureFailure) {
         send(&mut self.commands, &mut self.failed, CaptureFailed { entity, error });
     }
 }

@@ -22,8 +22,10 @@
 //! fit, the old one stays. A capture and its GPU memory are freed with its last handle. Without a renderer, captures are ready once they are
 //! loaded.
 
+mod failure;
 mod loader;
 mod messages;
+mod parts;
 mod pause;
 mod plugin;
 mod processor;
@@ -33,10 +35,12 @@ mod systems;
 mod uploads;
 
 pub use super::component::{GaussianCapture, KeyFrames};
+pub use failure::CaptureFailure;
 pub use loader::{CaptureLoadError, CheckpointLoader, ImportLoader, PackageLoader, PackageLoaderSettings};
 pub(crate) use messages::send;
 pub use messages::{CaptureFailed, CaptureReady};
-pub(crate) use plugin::CaptureAssetPlugin;
+pub(crate) use parts::{set_up, set_up_late};
+pub use plugin::CaptureAssetPlugin;
 pub use processor::{
     CaptureProcessor, CaptureTransformError, CaptureTransformer, CaptureTransformerSettings, ProcessedForm,
 };

@@ -38,6 +38,7 @@ pub type CaptureProcessor<L> = LoadTransformAndSave<L, CaptureTransformer, Packa
 
 /// Makes captures smaller: packs them, lowers the degrees of their color, adds a temporal filter. Errors: [`CaptureTransformError`].
 #[derive(Debug, Default, Clone, Copy, TypePath)]
+#[type_path = "bevy_gs4d::asset"]
 pub struct CaptureTransformer;
 
 /// What a processed capture is like.
@@ -66,6 +67,7 @@ impl Default for CaptureTransformerSettings {
 
 /// The form of the Gaussians of a processed capture. The trained form, which offline tools need, is not among them: loaders of a game slice it.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub enum ProcessedForm {
     /// Single precision.
     Runtime,
@@ -76,6 +78,7 @@ pub enum ProcessedForm {
 
 /// Why a capture could not be processed.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum CaptureTransformError {
     /// The packed form cannot hold it.
     #[error(transparent)]

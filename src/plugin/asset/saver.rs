@@ -28,6 +28,7 @@ use serde::{Deserialize, Serialize};
 /// # }
 /// ```
 #[derive(Debug, Default, Clone, Copy, TypePath)]
+#[type_path = "bevy_gs4d::asset"]
 pub struct PackageSaver;
 
 /// Settings for writing a package.
@@ -46,6 +47,7 @@ impl Default for PackageSaverSettings {
 
 /// Why a capture could not be saved.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum CaptureSaveError {
     /// The Gaussians have been dropped from memory.
     #[error(

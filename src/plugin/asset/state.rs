@@ -2,6 +2,7 @@
 //!
 //! In: results of the systems in [`CaptureAssetSystems`]. Out: [`CaptureState`], a component that games read.
 
+use super::failure::CaptureFailure;
 use bevy::ecs::component::Component;
 use bevy::ecs::reflect::ReflectComponent;
 use bevy::ecs::schedule::SystemSet;
@@ -26,15 +27,16 @@ use bevy::reflect::std_traits::ReflectDefault;
 /// ```
 #[derive(Component, Reflect, Debug, Default, Clone, PartialEq, Eq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
+#[type_path = "bevy_gs4d::asset"]
+#[non_exhaustive]
 pub enum CaptureState {
     /// Not loaded, or not completely uploaded to the GPU. Nothing is drawn.
     #[default]
     Loading,
     /// Loaded and drawn; without a renderer, loaded. While another version is loaded and uploaded, the old one is drawn.
     Ready,
-    /// Could not be loaded or uploaded. The text names the file, the fault and, if there is one, the remedy.
-    /// `AssetServer::reload`, or a change of a file that Bevy watches, loads the capture again.
-    Failed(String),
+    /// Could not be loaded or uploaded. `AssetServer::reload`, or a change of a file that Bevy watches, loads the capture again.
+    Failed(CaptureFailure),
 }
 
 impl CaptureState {

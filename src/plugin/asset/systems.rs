@@ -7,20 +7,18 @@
 //! A capture that is among the assets and drawn is ready, independent of the server's load state: when a reload of a loaded capture fails,
 //! the server reports the capture as failed, but Bevy keeps the old one.
 
-use super::loader::CaptureLoadError;
+use super::failure::CaptureFailure;
 use super::messages::Announcer;
 use super::state::CaptureState;
 use super::uploads::Uploads;
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
-use bevy::asset::io::AssetReaderError;
-use bevy::asset::{AssetEvent, AssetId, AssetLoadError, AssetLoadFailedEvent, AssetServer, Assets, LoadState};
+use bevy::asset::{AssetEvent, AssetId, AssetLoadFailedEvent, AssetServer, Assets, LoadState};
 use bevy::ecs::change_detection::{DetectChanges, DetectChangesMut, Ref};
 use bevy::ecs::entity::Entity;
 use bevy::ecs::message::MessageReader;
 use bevy::ecs::system::{Local, Query, Res};
 use bevy::log::debug_span;
 use std::collections::{HashMap, HashSet};
-use std::fmt::Display;
 
 /// Updates the state of every entity with a capture, and sends messages about changes.
 pub(super) fn update_states(
@@ -46,9 +44,9 @@ pub(super) fn update_states(
             AssetEvent::Unused { .. } | AssetEvent::LoadedWithDependencies { .. } => {}
         }
     }
-    let mut failed: HashMap<AssetId<GaussianCapture>, String> = HashMap::new();
+    let mut failed: HashMap<AssetId<GaussianCapture>, CaptureFailure> = HashMap::new();
     for failure in failures.read() {
-        let error = describe(&failure.path, &failure.error);
+        let error = CaptureFailure::of_loading(Some(failure.path.to_string()), &failure.error);
         if reported.is_new(failure.id, &error) {
             failed.insert(failure.id, error);
         }
@@ -83,10 +81,8 @@ pub(super) fn update_states(
             announcer.failed(entity, error.clone());
         } else if let Some(LoadState::Failed(error)) = server.get_load_state(id) {
             if capture.is_changed() || !state.has_failed() {
-                let error = match server.get_path(id) {
-                    Some(path) => describe(path, &error),
-                    None => error.to_string(),
-                };
+                let path = server.get_path(id).map(|path| path.to_string());
+                let error = CaptureFailure::of_loading(path, &error);
                 state.set_if_neq(CaptureState::Failed(error.clone()));
                 if capture.is_changed() {
                     announcer.failed(entity, error);
@@ -101,7 +97,7 @@ pub(super) fn update_states(
 /// The failures to load that have been reported. Bevy repeats a failed reload immediately, a watched file may change several times in one
 /// save, and a game may try again every second: each failure is reported once, until the capture loads or fails with another error.
 #[derive(Default)]
-pub(super) struct ReportedFailures(HashMap<AssetId<GaussianCapture>, String>);
+pub(super) struct ReportedFailures(HashMap<AssetId<GaussianCapture>, CaptureFailure>);
 
 impl ReportedFailures {
     /// Forgets the failure of a capture that has been loaded or removed.
@@ -110,23 +106,8 @@ impl ReportedFailures {
     }
 
     /// Records a failure. Returns whether it has not been reported yet.
-    fn is_new(&mut self, id: AssetId<GaussianCapture>, error: &str) -> bool {
-        self.0.insert(id, error.to_owned()).is_none_or(|last| last != error)
-    }
-}
-
-/// Returns the file, the fault and the remedy, without the names of loaders and types with which Bevy's message begins.
-fn describe(path: impl Display, error: &AssetLoadError) -> String {
-    match error {
-        AssetLoadError::AssetReaderError(AssetReaderError::NotFound(file)) => format!(
-            "{path}: there is no file {}; check the name, and that the file is in the folder of the app's assets",
-            file.display()
-        ),
-        AssetLoadError::AssetLoaderError(error) => match error.error().downcast_ref::<CaptureLoadError>() {
-            Some(fault) => format!("{path}: {fault}"),
-            None => format!("{path}: {}", error.error()).trim_end().to_owned(),
-        },
-        _ => format!("{path}: {error}"),
+    fn is_new(&mut self, id: AssetId<GaussianCapture>, error: &CaptureFailure) -> bool {
+        self.0.insert(id, error.clone()).is_none_or(|last| last != *error)
     }
 }
 
@@ -162,10 +143,11 @@ mod tests {
     fn a_failure_is_reported_once_until_the_error_changes_or_loading_succeeds() {
         let mut reported = ReportedFailures::default();
         let id = AssetId::default();
-        let mut is_new = |error| reported.is_new(id, error);
+        let mut is_new = |error: &str| reported.is_new(id, &CaptureFailure::NotLoaded(error.to_owned()));
         assert_eq!(["cut off"; 3].map(&mut is_new), [true, false, false], "a repeated error is reported once");
         assert_eq!(["gone", "gone", "cut off"].map(&mut is_new), [true, false, true], "another error is reported");
         reported.clear(id);
-        assert!(reported.is_new(id, "cut off"), "after a success the same error is reported again");
+        let again = CaptureFailure::NotLoaded("cut off".to_owned());
+        assert!(reported.is_new(id, &again), "after a success the same error is reported again");
     }
 }

@@ -3,6 +3,7 @@
 //! In: the render world's reports: captures whose upload is complete, and the errors of failed uploads. Out: [`Uploads`], shared by both
 //! worlds, which decides the loading states of entities and when playback begins.
 
+use super::failure::CaptureFailure;
 use crate::plugin::component::GaussianCapture;
 use bevy::asset::AssetId;
 use bevy::ecs::resource::Resource;
@@ -28,7 +29,7 @@ pub(super) struct UploadStates {
 /// Why a capture could not be uploaded.
 #[derive(Debug)]
 pub(super) struct UploadFailure {
-    pub(super) error: String,
+    pub(super) error: CaptureFailure,
     /// Whether messages about this attempt have been sent.
     pub(super) reported: bool,
 }
@@ -76,7 +77,7 @@ impl Uploads {
     }
 
     /// Records that the upload of a capture has failed.
-    pub(crate) fn fail(&self, capture: AssetId<GaussianCapture>, error: String) {
+    pub(crate) fn fail(&self, capture: AssetId<GaussianCapture>, error: CaptureFailure) {
         self.lock().failures.insert(capture, UploadFailure { error, reported: false });
     }
 

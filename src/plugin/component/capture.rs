@@ -29,6 +29,7 @@ use std::sync::Arc;
 /// # Ok::<(), bevy_gs4d::gaussian::InvalidGaussian>(())
 /// ```
 #[derive(Asset, TypePath, Debug, Clone)]
+#[type_path = "bevy_gs4d::asset"]
 pub struct GaussianCapture {
     scene: Arc<RuntimeScene>,
     bounds: Option<Arc<BoundsOverTime>>,

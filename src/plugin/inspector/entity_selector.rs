@@ -48,7 +48,7 @@ pub(super) fn show_state(ui: &mut egui::Ui, state: &CaptureState) {
     match state {
         CaptureState::Loading => ui.weak("loading ..."),
         CaptureState::Ready => ui.weak("ready"),
-        CaptureState::Failed(failure) => ui.colored_label(ui.visuals().error_fg_color, failure.as_str()),
+        CaptureState::Failed(failure) => ui.colored_label(ui.visuals().error_fg_color, failure.to_string()),
     };
 }
 

@@ -1,6 +1,6 @@
 //! A panel that shows and edits captures, for the development of a game.
 //!
-//! In: an app with [`GaussianCapturePlugin`](crate::GaussianCapturePlugin), captures and a `Camera3d`. Out:
+//! In: an app with [`GaussianCapturePlugins`](crate::GaussianCapturePlugins), captures and a `Camera3d`. Out:
 //! [`InspectorPlugin`], which draws the panel over the picture with `bevy_egui`, and [`Inspector`], its settings.
 //!
 //! ```no_run
@@ -8,7 +8,7 @@
 //! use bevy_gs4d::prelude::*;
 //! use bevy_gs4d::inspector::InspectorPlugin;
 //!
-//! App::new().add_plugins((DefaultPlugins, GaussianCapturePlugin, InspectorPlugin)).run();
+//! App::new().add_plugins((DefaultPlugins, GaussianCapturePlugins, InspectorPlugin)).run();
 //! ```
 //!
 //! | section | shows and sets |

@@ -9,7 +9,7 @@ use super::settings::Inspector;
 use super::timing::Measuring;
 use super::warnings::{IdleTimes, PlacedCamera, PlacedCapture};
 use super::{appearance, camera, counts, memory, playback, timing, warnings};
-use crate::plugin::asset::CaptureState;
+use crate::plugin::asset::{CaptureAssetPlugin, CaptureState};
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use crate::plugin::playback::Playback;
 use crate::plugin::render::{CameraFault, CaptureSettings, CaptureStatistics, CaptureViewSettings, DepthWrite};
@@ -23,10 +23,11 @@ use bevy::ecs::entity::Entity;
 use bevy::ecs::name::Name;
 use bevy::ecs::query::{With, Without};
 use bevy::ecs::schedule::IntoScheduleConfigs;
-use bevy::ecs::schedule::common_conditions::not;
+use bevy::ecs::schedule::common_conditions::{not, resource_exists};
 use bevy::ecs::system::{Commands, Local, Query, Res, ResMut, SystemParam};
 use bevy::input::ButtonInput;
 use bevy::input::keyboard::KeyCode;
+use bevy::log::warn;
 use bevy::render::view::Msaa;
 use bevy::time::{Real, Time};
 use bevy_egui::input::{WindowToEguiContextMap, egui_wants_any_keyboard_input};
@@ -40,7 +41,7 @@ use std::collections::HashSet;
 /// Draws the panel that [the module](crate::inspector) describes at the right edge of the first camera's picture. The panel is initially
 /// open; F1 closes and opens it.
 ///
-/// Add it after `DefaultPlugins` and [`GaussianCapturePlugin`](crate::GaussianCapturePlugin). It adds `EguiPlugin` unless the app already
+/// Add it after `DefaultPlugins` and [`GaussianCapturePlugins`](crate::GaussianCapturePlugins). It adds `EguiPlugin` unless the app already
 /// has it. It also works without a window. When the panel's camera is despawned, another camera draws the panel, unless
 /// [`EguiGlobalSettings::auto_create_primary_context`] is off.
 #[derive(Debug, Default, Clone, Copy)]
@@ -52,6 +53,8 @@ impl Plugin for InspectorPlugin {
             app.add_plugins(EguiPlugin::default());
         }
         app.init_resource::<Inspector>()
+            // An app that does not draw captures has no statistics of its own.
+            .init_resource::<CaptureStatistics>()
             .add_systems(
                 PreUpdate,
                 move_context
@@ -61,9 +64,18 @@ impl Plugin for InspectorPlugin {
                     .before(WindowToEguiContextMap::on_egui_context_added_system),
             )
             .add_systems(Update, toggle.run_if(not(egui_wants_any_keyboard_input)))
-            .add_systems(EguiPrimaryContextPass, show_panel)
+            .add_systems(EguiPrimaryContextPass, show_panel.run_if(resource_exists::<Assets<GaussianCapture>>))
             // In `Last`, the visible entities of cameras are known.
-            .add_systems(Last, update_warnings);
+            .add_systems(Last, update_warnings.run_if(resource_exists::<Assets<GaussianCapture>>));
+    }
+
+    fn finish(&self, app: &mut App) {
+        if !app.is_plugin_added::<CaptureAssetPlugin>() {
+            warn!(
+                "InspectorPlugin shows captures, which this app does not load: add GaussianCapturePlugins, or remove \
+                 InspectorPlugin"
+            );
+        }
     }
 }
 
@@ -313,8 +325,7 @@ fn section(ui: &mut egui::Ui, title: &str, open: bool, contents: impl FnOnce(&mu
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plugin::asset::CaptureAssetPlugin;
-    use crate::plugin::playback::PlaybackPlugin;
+    use crate::plugin::playback::CapturePlaybackPlugin;
     use crate::scene::synth::{SynthSettings, synthesize};
     use bevy::MinimalPlugins;
     use bevy::asset::AssetPlugin;
@@ -340,7 +351,7 @@ mod tests {
     #[test]
     fn warnings_need_neither_an_open_panel_nor_a_camera() {
         let mut app = App::new();
-        app.add_plugins((MinimalPlugins, AssetPlugin::default(), CaptureAssetPlugin, PlaybackPlugin));
+        app.add_plugins((MinimalPlugins, AssetPlugin::default(), CaptureAssetPlugin, CapturePlaybackPlugin));
         app.init_resource::<CaptureStatistics>().insert_resource(Inspector { open: false, ..Inspector::default() });
         app.add_systems(Last, update_warnings);
         let settings = SynthSettings { count: 20, degree: 0, ..SynthSettings::default() };

@@ -3,8 +3,11 @@
 //! In: fields that any system may set. Out: [`Inspector`], a resource that the panel reads and, on input, writes.
 
 use bevy::ecs::entity::Entity;
+use bevy::ecs::reflect::ReflectResource;
 use bevy::ecs::resource::Resource;
 use bevy::input::keyboard::KeyCode;
+use bevy::reflect::Reflect;
+use bevy::reflect::std_traits::ReflectDefault;
 
 /// The settings of the panel: a resource. Any field may be set at any time.
 ///
@@ -21,7 +24,9 @@ use bevy::input::keyboard::KeyCode;
 /// }
 /// # bevy::ecs::system::assert_is_system(setup);
 /// ```
-#[derive(Resource, Debug, Clone, PartialEq)]
+#[derive(Resource, Reflect, Debug, Clone, PartialEq)]
+#[reflect(Resource, Default, Debug, Clone, PartialEq)]
+#[type_path = "bevy_gs4d::inspector"]
 pub struct Inspector {
     /// Whether the panel is drawn. While it is closed, only [`warnings`](Self::warnings) are updated. Default: true.
     pub open: bool,

@@ -55,7 +55,7 @@ fn about_capture(capture: &PlacedCapture, without_cameras: bool, warnings: &mut 
     let label = &capture.label;
     match capture.state {
         // The failure names the file.
-        CaptureState::Failed(failure) => warnings.push(failure.clone()),
+        CaptureState::Failed(failure) => warnings.push(failure.to_string()),
         CaptureState::Loading => {}
         CaptureState::Ready => {
             if without_cameras {
@@ -129,6 +129,7 @@ fn idle_times(capture: &GaussianCapture) -> Vec<Range<f32>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::plugin::asset::CaptureFailure;
     use crate::scene::synth::{SynthSettings, synthesize};
     use crate::scene::{FilterKind, GaussianScene, TemporalFilter};
 
@@ -168,7 +169,7 @@ mod tests {
 
     #[test]
     fn each_fault_has_one_warning() {
-        let failed = CaptureState::Failed("broken.gs4d: copy it again".into());
+        let failed = CaptureState::Failed(CaptureFailure::NotLoaded("broken.gs4d: copy it again".into()));
         let idle = [0.5..1.0, 1.5..2.0];
         let captures = [
             seen(&failed),

@@ -10,6 +10,6 @@ mod shade;
 mod shadow;
 
 pub use contact_shadow::CaptureContactShadow;
-pub(crate) use plugin::CapturePbrPlugin;
+pub use plugin::CapturePbrPlugin;
 pub use shade::{CaptureLight, ReceivesShadows};
 pub use shadow::{CastsShadows, ShadowResolution};

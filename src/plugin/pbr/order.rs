@@ -7,7 +7,7 @@
 use crate::plugin::component::GaussianCapture3d;
 use crate::plugin::render::CaptureSystems;
 use crate::plugin::render::order::{OtherPass, OtherPasses};
-use bevy::app::App;
+use bevy::app::{App, SubApp};
 use bevy::camera::Camera3d;
 use bevy::camera::primitives::Aabb;
 use bevy::core_pipeline::core_3d::{Transparent3d, TransparentSortingInfo3d};
@@ -53,6 +53,11 @@ pub(super) fn build(app: &mut App) {
                 .in_set(RenderSystems::PhaseSort)
                 .after(sort_phase_system::<Transmissive3d>),
         );
+}
+
+/// Returns whether the systems and resources of this module have been added.
+pub(super) fn is_built(render_app: &SubApp) -> bool {
+    render_app.world().contains_resource::<MovedMeshes>()
 }
 
 /// Returns the extraction of the meshes that have moved. It is skipped while there are no meshes and no moved meshes to clear.

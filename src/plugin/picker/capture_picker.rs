@@ -34,6 +34,7 @@ use std::sync::Arc;
 /// }
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct CaptureHit {
     /// The entity with the capture.
     pub entity: Entity,

@@ -18,7 +18,7 @@
 //!     commands.spawn((Camera3d::default(), Transform::from_xyz(0.0, 1.0, 4.0)));
 //! }
 //!
-//! App::new().add_plugins((DefaultPlugins, GaussianCapturePlugin)).add_systems(Startup, setup).run();
+//! App::new().add_plugins((DefaultPlugins, GaussianCapturePlugins)).add_systems(Startup, setup).run();
 //! ```
 //!
 //! A pointer hits the same Gaussian as [`CapturePicker`](crate::picker::CapturePicker): the one at which half of the light along the ray is
@@ -40,5 +40,5 @@ mod plugin;
 mod searches;
 mod settings;
 
-pub(crate) use plugin::CapturePickingPlugin;
+pub use plugin::CapturePickingPlugin;
 pub use settings::{CapturePickingCamera, CapturePickingSettings};

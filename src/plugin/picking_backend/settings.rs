@@ -27,6 +27,7 @@ use bevy::reflect::std_traits::ReflectDefault;
 /// ```
 #[derive(Resource, Reflect, Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[reflect(Resource, Default, Debug, Clone, PartialEq)]
+#[type_path = "bevy_gs4d::picking_backend"]
 pub struct CapturePickingSettings {
     /// Whether rays are cast only through cameras with a [`CapturePickingCamera`] and only at captures with Bevy's `Pickable`. Default:
     /// false.
@@ -36,4 +37,5 @@ pub struct CapturePickingSettings {
 /// Marks a camera through which pointers hit captures, if [`CapturePickingSettings::require_markers`] is set.
 #[derive(Component, Reflect, Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
+#[type_path = "bevy_gs4d::picking_backend"]
 pub struct CapturePickingCamera;

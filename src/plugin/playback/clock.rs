@@ -6,6 +6,7 @@
 use bevy::ecs::component::Component;
 use bevy::ecs::entity::Entity;
 use bevy::ecs::reflect::ReflectComponent;
+use bevy::ecs::template::FromTemplate;
 use bevy::reflect::Reflect;
 use bevy::reflect::std_traits::ReflectDefault;
 
@@ -30,6 +31,7 @@ use bevy::reflect::std_traits::ReflectDefault;
 /// ```
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
+#[type_path = "bevy_gs4d::playback"]
 pub struct PlaybackClock {
     /// The time of the clock, in seconds. Neither rounded nor wrapped: followers wrap it. Default: 0.
     pub seconds: f64,
@@ -47,6 +49,8 @@ pub struct PlaybackClock {
 /// The source of a clock's time. Default: [`Game`](Self::Game).
 #[derive(Reflect, Debug, Default, Clone, Copy, PartialEq, Eq, Hash)]
 #[reflect(Default, Debug, Clone, PartialEq)]
+#[type_path = "bevy_gs4d::playback"]
+#[non_exhaustive]
 pub enum ClockSource {
     /// Bevy's virtual time: the clock pauses and scales with it.
     #[default]
@@ -73,6 +77,7 @@ pub enum ClockSource {
 ///
 /// ```
 /// use bevy::prelude::*;
+/// use bevy_gs4d::playback::FollowsClock;
 /// use bevy_gs4d::prelude::*;
 ///
 /// fn setup(mut commands: Commands, assets: Res<AssetServer>) {
@@ -84,8 +89,9 @@ pub enum ClockSource {
 /// }
 /// # bevy::ecs::system::assert_is_system(setup);
 /// ```
-#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Component, FromTemplate, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
 #[reflect(Component, Debug, Clone, PartialEq)]
+#[type_path = "bevy_gs4d::playback"]
 pub struct FollowsClock(#[entities] pub Entity);
 
 impl Default for PlaybackClock {

@@ -34,6 +34,7 @@ use bevy::reflect::std_traits::ReflectDefault;
 /// ```
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
+#[type_path = "bevy_gs4d::playback"]
 #[require(PlaybackState)]
 pub struct Playback {
     /// Seconds since the capture's start. The plugin clamps the time to the range from `start` to `end`, unless the range is empty: seeking
@@ -79,6 +80,7 @@ impl Playback {
     /// # Examples
     ///
     /// ```
+    /// use bevy_gs4d::playback::Repeat;
     /// use bevy_gs4d::prelude::*;
     ///
     /// assert_eq!(Playback::once().repeat, Repeat::Once);
@@ -92,6 +94,7 @@ impl Playback {
     /// # Examples
     ///
     /// ```
+    /// use bevy_gs4d::playback::Repeat;
     /// use bevy_gs4d::prelude::*;
     ///
     /// assert_eq!(Playback::ping_pong().repeat, Repeat::PingPong);

@@ -11,6 +11,7 @@ use bevy::reflect::std_traits::ReflectDefault;
 /// A named time: playing across it sends [`MarkerReached`](super::MarkerReached).
 #[derive(Reflect, Debug, Default, Clone, PartialEq)]
 #[reflect(Default, Debug, Clone, PartialEq)]
+#[type_path = "bevy_gs4d::playback"]
 pub struct Marker {
     /// Seconds since the start of the timeline or of the capture: 0 or later.
     pub time: f32,
@@ -28,6 +29,7 @@ pub struct Marker {
 ///
 /// ```
 /// use bevy::prelude::*;
+/// use bevy_gs4d::playback::{MarkerReached, Markers};
 /// use bevy_gs4d::prelude::*;
 ///
 /// fn setup(mut commands: Commands, assets: Res<AssetServer>) {
@@ -40,6 +42,7 @@ pub struct Marker {
 /// ```
 #[derive(Component, Reflect, Debug, Default, Clone, PartialEq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
+#[type_path = "bevy_gs4d::playback"]
 pub struct Markers(pub Vec<Marker>);
 
 impl Markers {

@@ -83,6 +83,7 @@ pub struct PlaybackSeeked {
 ///
 /// ```
 /// use bevy::prelude::*;
+/// use bevy_gs4d::playback::SegmentBoundCrossed;
 /// use bevy_gs4d::prelude::*;
 ///
 /// fn report(mut crossed: MessageReader<SegmentBoundCrossed>) {
@@ -109,6 +110,7 @@ pub struct SegmentBoundCrossed {
 ///
 /// ```
 /// use bevy::prelude::*;
+/// use bevy_gs4d::playback::MarkerReached;
 /// use bevy_gs4d::prelude::*;
 ///
 /// fn cue(mut markers: MessageReader<MarkerReached>) {

@@ -41,7 +41,8 @@ pub use markers::{Marker, Markers};
 pub use messages::{
     MarkerReached, PlaybackEnded, PlaybackLooped, PlaybackPaused, PlaybackSeeked, PlaybackStarted, SegmentBoundCrossed,
 };
-pub(crate) use plugin::PlaybackPlugin;
+pub use plugin::CapturePlaybackPlugin;
+pub(crate) use plugin::require_playback;
 pub use repeat::Repeat;
 pub use systems::PlaybackSystems;
 pub use timeline::{

@@ -9,51 +9,76 @@ use super::messages::{
 };
 use super::systems::{PlaybackSystems, advance_captures, run_clocks, warn_of_missing_handles};
 use super::timeline::{Timeline, TimelineLoader, TimelinePlayer, advance_timelines, bind_tracks, direct_tracks};
+use crate::plugin::asset::{set_up, set_up_late};
 use crate::plugin::component::GaussianCapture3d;
 use bevy::app::{App, Last, Plugin, Update};
 use bevy::asset::AssetApp;
 use bevy::ecs::query::Changed;
 use bevy::ecs::schedule::IntoScheduleConfigs;
 use bevy::ecs::schedule::common_conditions::{any_match_filter, any_with_component};
+use bevy::log::warn;
+use bevy::time::Time;
 
-/// Plays captures and timelines. Part of [`GaussianCapturePlugin`](crate::GaussianCapturePlugin).
+/// Plays captures and timelines. Part of [`GaussianCapturePlugins`](crate::GaussianCapturePlugins). Without it, captures show the time that
+/// the game sets in their [`Playback`].
 #[derive(Debug, Default, Clone, Copy)]
-pub(crate) struct PlaybackPlugin;
+pub struct CapturePlaybackPlugin;
 
-impl Plugin for PlaybackPlugin {
+impl Plugin for CapturePlaybackPlugin {
     fn build(&self, app: &mut App) {
-        use PlaybackSystems::{Advance, Clocks, Timelines};
-        app.init_asset::<Timeline>()
-            .register_required_components::<GaussianCapture3d, Playback>()
-            .init_asset_loader::<TimelineLoader>()
-            .add_message::<PlaybackStarted>()
-            .add_message::<PlaybackPaused>()
-            .add_message::<PlaybackSeeked>()
-            .add_message::<SegmentBoundCrossed>()
-            .add_message::<MarkerReached>()
-            .add_message::<PlaybackLooped>()
-            .add_message::<PlaybackEnded>()
-            .configure_sets(Update, (Clocks, Timelines, Advance).chain())
-            .add_systems(
-                Update,
-                (
-                    run_clocks.run_if(any_with_component::<PlaybackClock>).in_set(Clocks),
-                    (bind_tracks, advance_timelines, direct_tracks)
-                        .chain()
-                        .run_if(any_with_component::<TimelinePlayer>)
-                        .in_set(Timelines),
-                    advance_captures.in_set(Advance),
-                ),
-            )
-            // The game may still set a handle in the same frame.
-            .add_systems(Last, warn_of_missing_handles.run_if(any_match_filter::<Changed<GaussianCapture3d>>));
+        set_up::<Self>(app, add);
     }
+
+    fn finish(&self, app: &mut App) {
+        set_up_late::<Self>(app, "CapturePlaybackPlugin", add);
+        if !app.world().contains_resource::<Time>() {
+            warn!(
+                "CapturePlaybackPlugin needs Bevy's TimePlugin, which this app does not have, so that captures stay at \
+                 their first moment: add DefaultPlugins or MinimalPlugins, or TimePlugin itself"
+            );
+            app.init_resource::<Time>();
+        }
+    }
+}
+
+fn add(app: &mut App) {
+    use PlaybackSystems::{Advance, Clocks, Timelines};
+    require_playback(app);
+    app.init_asset::<Timeline>()
+        .init_asset_loader::<TimelineLoader>()
+        .add_message::<PlaybackStarted>()
+        .add_message::<PlaybackPaused>()
+        .add_message::<PlaybackSeeked>()
+        .add_message::<SegmentBoundCrossed>()
+        .add_message::<MarkerReached>()
+        .add_message::<PlaybackLooped>()
+        .add_message::<PlaybackEnded>()
+        .configure_sets(Update, (Clocks, Timelines, Advance).chain())
+        .add_systems(
+            Update,
+            (
+                run_clocks.run_if(any_with_component::<PlaybackClock>).in_set(Clocks),
+                (bind_tracks, advance_timelines, direct_tracks)
+                    .chain()
+                    .run_if(any_with_component::<TimelinePlayer>)
+                    .in_set(Timelines),
+                advance_captures.in_set(Advance),
+            ),
+        )
+        // The game may still set a handle in the same frame.
+        .add_systems(Last, warn_of_missing_handles.run_if(any_match_filter::<Changed<GaussianCapture3d>>));
+}
+
+/// Makes [`Playback`] a required component of captures: it has the time that is played, and the time that is drawn.
+pub(crate) fn require_playback(app: &mut App) {
+    // The other of the two plugins that need it may have registered it before.
+    let _ = app.try_register_required_components::<GaussianCapture3d, Playback>();
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plugin::asset::{CaptureAssetPlugin, Uploads};
+    use crate::plugin::asset::{CaptureAssetPlugin, CaptureFailure, Uploads};
     use crate::plugin::component::GaussianCapture;
     use crate::plugin::playback::clock::FollowsClock;
     use crate::plugin::playback::markers::{Marker, Markers};
@@ -81,7 +106,7 @@ mod tests {
     /// Returns an app in which captures wait for uploads, and the uploads, which the test completes.
     fn app() -> (App, Uploads) {
         let mut app = App::new();
-        app.add_plugins((MinimalPlugins, AssetPlugin::default(), CaptureAssetPlugin, PlaybackPlugin));
+        app.add_plugins((MinimalPlugins, AssetPlugin::default(), CaptureAssetPlugin, CapturePlaybackPlugin));
         app.init_resource::<Reached>();
         app.add_observer(|marker: On<MarkerReached>, mut reached: ResMut<Reached>| reached.0.push(marker.name.clone()));
         let uploads = app.world().resource::<Uploads>().clone();
@@ -163,7 +188,7 @@ mod tests {
         let capture = capture(&mut app);
         let player = spawn(&mut app, &capture, ());
         pass(&mut app, 1);
-        uploads.fail(capture.id(), "no room".into());
+        uploads.fail(capture.id(), CaptureFailure::NotLoaded("no room".to_owned()));
         pass(&mut app, 2);
         assert_eq!(time(&app, player), 0.5, "playback does not wait for a failed upload");
     }

@@ -12,6 +12,7 @@ use bevy::reflect::std_traits::ReflectDefault;
 /// # Examples
 ///
 /// ```
+/// use bevy_gs4d::playback::Repeat;
 /// use bevy_gs4d::prelude::*;
 ///
 /// /// Returns the time one second after 1.5 s in a capture of 2 s.
@@ -27,6 +28,8 @@ use bevy::reflect::std_traits::ReflectDefault;
 /// ```
 #[derive(Reflect, Debug, Default, Clone, Copy, PartialEq, Eq, Hash)]
 #[reflect(Default, Debug, Clone, PartialEq)]
+#[type_path = "bevy_gs4d::playback"]
+#[non_exhaustive]
 pub enum Repeat {
     /// Stops at the last moment of the range; played backwards, at the first.
     Once,

@@ -23,6 +23,7 @@ use bevy::time::Time;
 
 /// Sets of playback systems in `Update`, in this order.
 #[derive(SystemSet, Debug, Clone, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum PlaybackSystems {
     /// Clocks with [`ClockSource::Game`](super::ClockSource::Game) advance. Set manual clocks `.before` this set.
     Clocks,

@@ -13,10 +13,13 @@ use crate::scene::{Bounds, Level};
 use bevy::camera::{Camera3d, MainPassResolutionOverride};
 use bevy::ecs::entity::Entity;
 use bevy::ecs::query::With;
+use bevy::ecs::reflect::ReflectResource;
 use bevy::ecs::resource::Resource;
 use bevy::ecs::system::{Query, Res, ResMut};
 use bevy::log::debug_span;
 use bevy::platform::collections::HashMap;
+use bevy::reflect::Reflect;
+use bevy::reflect::std_traits::ReflectDefault;
 use bevy::render::Extract;
 use bevy::render::render_asset::RenderAssets;
 use bevy::render::sync_world::{MainEntity, MainEntityHashMap};
@@ -57,7 +60,9 @@ const FARTHEST: f32 = 6.0;
 /// }
 /// # bevy::ecs::system::assert_is_system(hurry);
 /// ```
-#[derive(Resource, Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Resource, Reflect, Debug, Clone, Copy, Default, PartialEq)]
+#[reflect(Resource, Default, Debug, Clone, PartialEq)]
+#[type_path = "bevy_gs4d::render"]
 pub struct CaptureDetail {
     /// Bias on the size on the screen, in stops: at −1 captures count as half as large, so that coarser levels are drawn; at 1 as twice as
     /// large. Default: 0, as measured when the levels were made.

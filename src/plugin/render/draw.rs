@@ -33,6 +33,7 @@ use bevy::render::view::{ExtractedView, Msaa, ViewDepthTexture, ViewTarget};
 
 /// Sets of systems in the render world's `Core3d` schedule, for ordering.
 #[derive(SystemSet, Debug, Clone, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum CaptureSystems {
     /// Draws captures into a separate picture after opaque meshes, if [`Shade`](Self::Shade) needs it.
     Record,

@@ -9,6 +9,7 @@ use glam::Mat4;
 /// The reason why a camera cannot draw captures as it draws meshes. The text names the remedy. It is logged once and shown by the
 /// inspector.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum CameraFault {
     /// Colors are composited in Oklab.
     #[error("captures are not drawn for a camera with CompositingSpace::Oklab: use Srgb or Linear")]

@@ -107,7 +107,9 @@ pub use draw::CaptureSystems;
 #[cfg(feature = "pbr")]
 pub(crate) use extract::{ExtractedCaptures, extract_captures};
 pub use fault::CameraFault;
-pub(crate) use plugin::CaptureRenderPlugin;
+pub use plugin::CaptureRenderPlugin;
+#[cfg(feature = "pbr")]
+pub(crate) use plugin::has_captures;
 #[cfg(feature = "pbr")]
 pub(crate) use renderer::CaptureRenderer;
 pub use settings::{CaptureSettings, CaptureViewSettings, CropBox, DepthWrite};

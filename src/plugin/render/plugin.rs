@@ -26,8 +26,9 @@ use super::upload::{CaptureUploadBudget, GpuGaussianCapture, any_uploading, cont
 use super::visibility::update_bounds;
 use super::write_depth::WriteDepthPipeline;
 use super::write_motion::WriteMotionPipeline;
-use crate::plugin::asset::Uploads;
+use crate::plugin::asset::{Uploads, set_up, set_up_late};
 use crate::plugin::component::GaussianCapture3d;
+use crate::plugin::playback::require_playback;
 use bevy::app::{App, Plugin, PostUpdate, SubApp};
 use bevy::asset::Assets;
 use bevy::camera::visibility::VisibilitySystems;
@@ -36,35 +37,49 @@ use bevy::core_pipeline::oit::resolve::node::oit_resolve;
 use bevy::core_pipeline::schedule::{Core3d, Core3dSystems, camera_driver};
 use bevy::ecs::entity::Entity;
 use bevy::ecs::schedule::{IntoScheduleConfigs, SystemCondition};
+use bevy::log::warn;
 use bevy::render::render_asset::{RenderAssetPlugin, prepare_assets};
 use bevy::render::renderer::{RenderGraph, RenderGraphSystems};
 use bevy::render::{ExtractSchedule, GpuResourceAppExt, Render, RenderApp, RenderStartup, RenderSystems};
 use bevy::shader::Shader;
 
-/// Draws captures. Part of [`GaussianCapturePlugin`](crate::GaussianCapturePlugin).
+/// Draws captures. Part of [`GaussianCapturePlugins`](crate::GaussianCapturePlugins). Without it, or without a renderer, captures are ready
+/// once they have been loaded.
 #[derive(Debug, Default, Clone, Copy)]
-pub(crate) struct CaptureRenderPlugin;
+pub struct CaptureRenderPlugin;
 
 impl Plugin for CaptureRenderPlugin {
     fn build(&self, app: &mut App) {
-        app.init_resource::<CaptureStatistics>()
-            .init_resource::<CaptureUploadBudget>()
-            .init_resource::<CaptureDetail>()
-            .register_required_components::<GaussianCapture3d, CaptureSettings>()
-            .add_plugins(RenderAssetPlugin::<GpuGaussianCapture>::default())
-            .add_systems(PostUpdate, update_bounds.in_set(VisibilitySystems::CalculateBounds));
-        build_rendering(app);
+        set_up::<Self>(app, add);
     }
 
+    /// Bevy's `RenderPlugin` may have been added later than this plugin.
     fn finish(&self, app: &mut App) {
-        let has_captures = |render_app: &SubApp| render_app.world().contains_resource::<ExtractedCaptures>();
-        let late = app.get_sub_app(RenderApp).is_some_and(|render_app| !has_captures(render_app));
-        assert!(
-            !late,
-            "Bevy's RenderPlugin was added after GaussianCapturePlugin, which therefore draws nothing: add \
-             GaussianCapturePlugin after DefaultPlugins or, in an app without them, after RenderPlugin"
-        );
+        set_up_late::<Self>(app, "CaptureRenderPlugin", add);
+        let draws = app.get_sub_app(RenderApp).is_none_or(has_captures);
+        if !draws && app.world().contains_resource::<Uploads>() {
+            warn!(
+                "Bevy's RenderPlugin was added after GaussianCapturePlugins, which were set up to draw only when the app started: add \
+                 GaussianCapturePlugins after DefaultPlugins or, in an app without them, after RenderPlugin"
+            );
+            build_rendering(app);
+        }
     }
+}
+
+/// Returns whether captures are drawn by a render world.
+pub(crate) fn has_captures(render_app: &SubApp) -> bool {
+    render_app.world().contains_resource::<ExtractedCaptures>()
+}
+
+fn add(app: &mut App) {
+    require_playback(app);
+    app.init_resource::<CaptureStatistics>()
+        .init_resource::<CaptureUploadBudget>()
+        .init_resource::<CaptureDetail>()
+        .register_required_components::<GaussianCapture3d, CaptureSettings>()
+        .add_systems(PostUpdate, update_bounds.in_set(VisibilitySystems::CalculateBounds));
+    build_rendering(app);
 }
 
 /// Adds the systems and resources of the render world, if there is one.
@@ -76,7 +91,9 @@ fn build_rendering(app: &mut App) {
         return;
     }
     let Some(shaders) = add_shaders(app) else { return };
+    RenderAssetPlugin::<GpuGaussianCapture>::default().build(app);
     let Some(render_app) = app.get_sub_app_mut(RenderApp) else { return };
+    statistics.set_renderer_missing(None);
     uploads.expect();
     render_app
         .insert_resource(shaders)

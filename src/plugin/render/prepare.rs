@@ -87,8 +87,8 @@ impl Scene<'_> {
             let capture = self.captures.get(placed.asset)?;
             let time = capture.time_at(placed.seconds)?;
             let level = self.levels.of(viewer, *entity);
-            let trained_pixel = capture.antialias_pixel(level, placed.antialias);
-            let view = lens.view(size, time, camera, placed.world_from_capture)?.antialiased(trained_pixel);
+            let optics = capture.optics(level, placed.antialias)?;
+            let view = lens.view(size, time, camera, placed.world_from_capture)?.with_optics(optics);
             let (asset, appearance, filtered) = (placed.asset, placed.appearance, placed.filtered);
             Some(Drawn { entity: *entity, asset, view, appearance, filtered, level })
         }));
@@ -98,9 +98,11 @@ impl Scene<'_> {
     /// Returns the view of each drawn capture in the previous frame, when the camera had this pose.
     fn previous_views(&self, drawn: &[Drawn], pose: &CameraPose) -> Vec<View> {
         let before = |one: &Drawn| {
-            let Some(placed) = self.extracted.0.get(&one.entity) else { return one.view };
-            let time_at = |seconds| self.captures.get(one.asset)?.time_at(seconds);
-            self.previous.view(&one.entity, placed, &one.view, pose, time_at)
+            let capture = self.captures.get(one.asset);
+            let optics = capture.and_then(|capture| capture.optics(one.level, false));
+            let Some((placed, optics)) = self.extracted.0.get(&one.entity).zip(optics) else { return one.view };
+            let time_at = |seconds| capture?.time_at(seconds);
+            self.previous.view(&one.entity, placed, &one.view, pose, optics, time_at)
         };
         drawn.iter().map(before).collect()
     }

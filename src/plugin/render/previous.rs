@@ -9,7 +9,7 @@
 use super::extract::{ExtractedCapture, ExtractedCaptures};
 use super::view::CameraLens;
 use crate::plugin::component::GaussianCapture;
-use crate::view::View;
+use crate::view::{Optics, View};
 use bevy::asset::AssetId;
 use bevy::ecs::resource::Resource;
 use bevy::render::sync_world::{MainEntity, MainEntityHashMap};
@@ -53,21 +53,23 @@ impl PreviousCaptures {
     }
 
     /// Returns the view of a capture in the previous frame. `now` is its view in this frame, `pose` the camera's pose in the previous
-    /// frame, and `time_at` converts seconds to the capture's timestamp. A capture that did not exist in the previous frame counts as
-    /// unmoved.
+    /// frame, `optics` are those of the capture, and `time_at` converts seconds to the capture's timestamp. A capture that did not exist
+    /// in the previous frame counts as unmoved.
     pub(super) fn view(
         &self,
         entity: &MainEntity,
         placed: &ExtractedCapture,
         now: &View,
         pose: &CameraPose,
+        optics: Optics,
         time_at: impl Fn(f32) -> Option<f32>,
     ) -> View {
         let before = self.0.get(entity).filter(|before| before.asset == placed.asset);
         let world_from_capture = before.map_or(placed.world_from_capture, |before| before.world_from_capture);
         let steady = before.filter(|before| !is_jump(placed.seconds - before.seconds, before.step));
         let time = steady.and_then(|before| time_at(before.seconds)).unwrap_or(now.time);
-        pose.lens.view(now.size, time, pose.world_from_camera, world_from_capture).unwrap_or(*now)
+        let view = pose.lens.view(now.size, time, pose.world_from_camera, world_from_capture);
+        view.map_or(*now, |view| view.with_optics(optics))
     }
 }
 

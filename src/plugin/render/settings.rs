@@ -31,6 +31,7 @@ use glam::{Affine3A, Mat3, Quat, Vec3};
 /// ```
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
+#[type_path = "bevy_gs4d::render"]
 pub struct CaptureSettings {
     /// Whether the capture's temporal filter is used, if it has one: Gaussians that are not active in the current segment are then
     /// skipped. Default: true.
@@ -59,6 +60,7 @@ pub struct CaptureSettings {
 /// ```
 /// use bevy::prelude::*;
 /// use bevy_gs4d::prelude::*;
+/// use bevy_gs4d::render::CropBox;
 ///
 /// // A column of 2 x 2 units about the z axis, infinitely high.
 /// let column = CropBox { half_size: Vec3::new(1.0, 1.0, f32::INFINITY), ..default() };
@@ -69,6 +71,7 @@ pub struct CaptureSettings {
 /// ```
 #[derive(Reflect, Debug, Clone, Copy, PartialEq)]
 #[reflect(Default, Debug, Clone, PartialEq)]
+#[type_path = "bevy_gs4d::render"]
 pub struct CropBox {
     /// Center of the box. Default: the origin.
     pub center: Vec3,
@@ -85,6 +88,7 @@ pub struct CropBox {
 /// ```
 /// use bevy::prelude::*;
 /// use bevy_gs4d::prelude::*;
+/// use bevy_gs4d::view::BlendSpace;
 ///
 /// fn setup(mut commands: Commands) {
 ///     let settings = CaptureViewSettings { blend_space: BlendSpace::Linear, ..default() };
@@ -94,6 +98,7 @@ pub struct CropBox {
 /// ```
 #[derive(Component, Reflect, Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
+#[type_path = "bevy_gs4d::render"]
 pub struct CaptureViewSettings {
     /// The space in which Gaussians are blended with each other and with the background. Default: [`BlendSpace::Encoded`], as trained.
     pub blend_space: BlendSpace,
@@ -116,6 +121,7 @@ pub struct CaptureViewSettings {
 /// ```
 /// use bevy::prelude::*;
 /// use bevy_gs4d::prelude::*;
+/// use bevy_gs4d::render::DepthWrite;
 ///
 /// fn setup(mut commands: Commands) {
 ///     let settings = CaptureViewSettings { depth: DepthWrite::Median, ..default() };
@@ -125,6 +131,8 @@ pub struct CaptureViewSettings {
 /// ```
 #[derive(Reflect, Debug, Default, Clone, Copy, PartialEq, Eq, Hash)]
 #[reflect(Default, Debug, Clone, PartialEq, Hash)]
+#[type_path = "bevy_gs4d::render"]
+#[non_exhaustive]
 pub enum DepthWrite {
     /// [`Expected`](Self::Expected) for cameras with one of Bevy's effects that read depths after the main pass, [`None`](Self::None) for
     /// others. These effects are `DepthOfField`, `VolumetricFog`, `OrderIndependentTransparencySettings`, and all effects with a

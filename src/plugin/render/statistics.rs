@@ -4,7 +4,10 @@
 
 use crate::renderer::{ViewStatistics, WorkCounters};
 use bevy::ecs::entity::Entity;
+use bevy::ecs::reflect::ReflectResource;
 use bevy::ecs::resource::Resource;
+use bevy::reflect::Reflect;
+use bevy::reflect::std_traits::ReflectDefault;
 use std::borrow::Cow;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -26,7 +29,10 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 /// }
 /// # bevy::ecs::system::assert_is_system(report);
 /// ```
-#[derive(Resource, Debug, Clone, Default)]
+#[derive(Resource, Reflect, Debug, Clone, Default)]
+#[reflect(opaque)]
+#[reflect(Resource, Default, Debug, Clone)]
+#[type_path = "bevy_gs4d::render"]
 pub struct CaptureStatistics(Arc<Mutex<Shared>>);
 
 #[derive(Debug, Default)]

@@ -6,16 +6,20 @@
 
 use super::renderer::CaptureRenderer;
 use super::statistics::CaptureStatistics;
-use crate::plugin::asset::Uploads;
+use crate::plugin::asset::{CaptureFailure, Uploads};
 use crate::plugin::component::GaussianCapture;
 use crate::renderer::memory::{Caught, catch, catch_known};
 use crate::renderer::{CaptureUpload, GpuCapture, GpuError, Storage, ViewRenderer};
 use crate::scene::{Bounds, Level, RuntimeScene};
+use crate::view::Optics;
 use bevy::asset::{AssetId, AssetServer, RenderAssetUsages};
+use bevy::ecs::reflect::ReflectResource;
 use bevy::ecs::resource::Resource;
 use bevy::ecs::system::lifetimeless::SRes;
 use bevy::ecs::system::{Res, ResMut, SystemParamItem};
 use bevy::log::{debug_span, error, warn};
+use bevy::reflect::Reflect;
+use bevy::reflect::std_traits::ReflectDefault;
 use bevy::render::Extract;
 use bevy::render::render_asset::{AssetExtractionError, PrepareAssetError, RenderAsset, RenderAssets};
 use bevy::render::renderer::{RenderDevice, RenderQueue};
@@ -38,7 +42,9 @@ use std::thread::JoinHandle;
 /// }
 /// # bevy::ecs::system::assert_is_system(hurry);
 /// ```
-#[derive(Resource, Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Resource, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
+#[reflect(Resource, Default, Debug, Clone, PartialEq)]
+#[type_path = "bevy_gs4d::render"]
 pub struct CaptureUploadBudget {
     /// Bytes per frame, summed over all captures; at least one Gaussian is uploaded. Default: 16 MiB.
     pub bytes_per_frame: u64,
@@ -138,9 +144,9 @@ impl GpuGaussianCapture {
         self.shown.as_ref().map_or(0, |shown| shown.levels.len().saturating_sub(1))
     }
 
-    /// Returns the size of training pixels with which a level of detail is anti-aliased; see [`RuntimeScene::antialias_pixel`].
-    pub(crate) fn antialias_pixel(&self, level: usize, antialias: bool) -> Option<f32> {
-        self.shown.as_ref()?.source.scene().antialias_pixel(level, antialias)
+    /// Returns how a level of detail is drawn; see [`RuntimeScene::optics`]. `None` if the capture cannot be drawn.
+    pub(crate) fn optics(&self, level: usize, antialias: bool) -> Option<Optics> {
+        Some(self.shown.as_ref()?.source.scene().optics(level, antialias))
     }
 
     /// Returns the size of the buffers in bytes.
@@ -229,8 +235,8 @@ impl RenderAsset for GpuGaussianCapture {
         uploads.begin(id, shown.is_some());
         let Some(renderer) = renderer else {
             // The failure has already been logged once for all captures.
-            let why = statistics.renderer_missing().unwrap_or_else(|| "there is no renderer".into());
-            uploads.fail(id, format!("{}: not drawn: {why}", name()));
+            let reason = statistics.renderer_missing().unwrap_or_else(|| "there is no renderer".into());
+            uploads.fail(id, CaptureFailure::NoRenderer { path: name(), reason });
             return Ok(Self { shown, next: None });
         };
         if source.scene().trained_with.uses_fov_sentinel() {
@@ -262,7 +268,7 @@ fn name(assets: &AssetServer, id: AssetId<GaussianCapture>) -> String {
 
 /// Logs and reports a failed upload.
 fn report(uploads: &Uploads, id: AssetId<GaussianCapture>, name: &str, failure: &GpuError) {
-    let failure = format!("{name}: not drawn: {failure}");
+    let failure = CaptureFailure::of_upload(name.to_owned(), failure);
     error!("{failure}");
     uploads.fail(id, failure);
 }

@@ -10,7 +10,7 @@
 //! ```no_run
 //! use bevy::camera::RenderTarget;
 //! use bevy::prelude::*;
-//! use bevy_gs4d::GaussianCapturePlugin;
+//! use bevy_gs4d::GaussianCapturePlugins;
 //! use bevy_gs4d::stereo::{EyeTargets, StereoRig, spawn_stereo};
 //!
 //! fn setup(mut commands: Commands) {
@@ -22,7 +22,7 @@
 //!     }
 //! }
 //!
-//! App::new().add_plugins((DefaultPlugins, GaussianCapturePlugin)).add_systems(Startup, setup).run();
+//! App::new().add_plugins((DefaultPlugins, GaussianCapturePlugins)).add_systems(Startup, setup).run();
 //! ```
 //!
 //! A headset has its own cameras and lenses; this module is for screens and pictures.

@@ -17,7 +17,7 @@ use bevy::transform::components::Transform;
 use glam::UVec2;
 
 /// Keeps the eyes of every [`StereoRig`] at their distance, and [side-by-side](SideBySide) eyes in their halves of the target. Part of
-/// [`GaussianCapturePlugin`](crate::GaussianCapturePlugin); adding it again has no effect.
+/// [`GaussianCapturePlugins`](crate::GaussianCapturePlugins); adding it again has no effect.
 ///
 /// # Examples
 ///

@@ -9,18 +9,20 @@ use bevy::ecs::entity::Entity;
 use bevy::ecs::hierarchy::ChildOf;
 use bevy::ecs::reflect::ReflectComponent;
 use bevy::ecs::system::Commands;
+use bevy::ecs::template::FromTemplate;
 use bevy::reflect::Reflect;
 use bevy::reflect::std_traits::ReflectDefault;
 use bevy::transform::components::Transform;
 
-/// A head. [`GaussianCapturePlugin`](crate::GaussianCapturePlugin) places its children with an [`Eye`] on both sides of it; the game sets
-/// the transform of the head.
+/// A head. [`StereoPlugin`](super::StereoPlugin) places its children with an [`Eye`] on both sides of it; the game sets the transform of the
+/// head.
 ///
 /// # Examples
 ///
 /// ```
 /// use bevy::prelude::*;
 /// use bevy_gs4d::prelude::*;
+/// use bevy_gs4d::stereo::StereoRig;
 ///
 /// fn widen(mut rig: Single<&mut StereoRig>) {
 ///     rig.ipd = 0.070;
@@ -29,6 +31,7 @@ use bevy::transform::components::Transform;
 /// ```
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
+#[type_path = "bevy_gs4d::stereo"]
 #[require(Transform, Visibility)]
 pub struct StereoRig {
     /// Distance between the eyes in world units, which are meters for a true sense of size. With 0 both eyes see the same picture; a value
@@ -42,13 +45,15 @@ impl Default for StereoRig {
     }
 }
 
-/// The eye that a camera draws for.
+/// The eye that a camera draws for. In Bevy's scene notation the left eye is the default.
 ///
 /// # Examples
 ///
 /// ```
 /// use bevy::prelude::*;
 /// use bevy_gs4d::prelude::*;
+/// use bevy_gs4d::stereo::Eye;
+/// use bevy_gs4d::view::DebugView;
 ///
 /// /// Shows the depth view only to the right eye.
 /// fn setup(eyes: Query<(Entity, &Eye)>, mut commands: Commands) {
@@ -63,11 +68,13 @@ impl Default for StereoRig {
 /// # bevy::ecs::system::assert_is_system(setup);
 /// assert_eq!(Eye::BOTH.map(Eye::side), [-1.0, 1.0], "left and right of the head");
 /// ```
-#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Component, FromTemplate, Reflect, Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[reflect(Component, Debug, Clone, PartialEq, Hash)]
+#[type_path = "bevy_gs4d::stereo"]
 #[require(Camera3d)]
 pub enum Eye {
     /// On the head's −x side.
+    #[default]
     Left,
     /// On the head's +x side.
     Right,
@@ -90,6 +97,7 @@ impl Eye {
 /// neither eye draws the column in the middle.
 #[derive(Component, Reflect, Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
+#[type_path = "bevy_gs4d::stereo"]
 pub struct SideBySide;
 
 /// The targets that the eyes draw into.
@@ -101,6 +109,7 @@ pub struct SideBySide;
 /// use bevy::prelude::*;
 /// use bevy::render::render_resource::TextureFormat;
 /// use bevy_gs4d::prelude::*;
+/// use bevy_gs4d::stereo::{EyeTargets, StereoRig, spawn_stereo};
 ///
 /// fn setup(mut commands: Commands, mut images: ResMut<Assets<Image>>) {
 ///     let mut picture = || {
@@ -132,7 +141,7 @@ pub struct Stereo {
 /// Spawns a head with two eyes, and returns their entities. The left eye is drawn first: its camera has the order 0, the right camera the
 /// order 1.
 ///
-/// [`GaussianCapturePlugin`](crate::GaussianCapturePlugin) keeps the eyes at their positions.
+/// [`StereoPlugin`](super::StereoPlugin) keeps the eyes at their positions.
 ///
 /// # Examples
 ///
@@ -140,6 +149,7 @@ pub struct Stereo {
 /// use bevy::camera::RenderTarget;
 /// use bevy::prelude::*;
 /// use bevy_gs4d::prelude::*;
+/// use bevy_gs4d::stereo::{EyeTargets, StereoRig, spawn_stereo};
 ///
 /// fn setup(mut commands: Commands) {
 ///     // Side by side in the primary window.

@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 /// Why an app could not be drawn into a picture, or could not go on.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum TestingError {
     /// The machine has no GPU adapter: a reason to skip a test, not to fail it.
     #[error("no GPU adapter: install a Vulkan driver (mesa-vulkan-drivers has one in software)")]

@@ -11,7 +11,7 @@
 //! use std::time::Duration;
 //!
 //! let mut app = testing::app(UVec2::new(320, 240));
-//! app.add_plugins(GaussianCapturePlugin);
+//! app.add_plugins(GaussianCapturePlugins);
 //! let capture = app.world().resource::<AssetServer>().load("toybox.gs4d");
 //! app.world_mut().spawn(GaussianCapture3d(capture));
 //! let eye = Transform::from_xyz(0.0, 1.0, 4.0).looking_at(Vec3::ZERO, Vec3::Y);
@@ -34,7 +34,7 @@
 //! use std::time::Duration;
 //!
 //! let mut app = App::new();
-//! app.add_plugins((MinimalPlugins, AssetPlugin::default(), bevy::input::InputPlugin, GaussianCapturePlugin));
+//! app.add_plugins((MinimalPlugins, AssetPlugin::default(), bevy::input::InputPlugin, GaussianCapturePlugins));
 //! let capture = app.world().resource::<AssetServer>().load("toybox.gs4d");
 //! let player = app.world_mut().spawn(GaussianCapture3d(capture)).id();
 //! testing::step(&mut app, Duration::from_millis(500))?;

@@ -4,13 +4,17 @@
 
 use bevy::asset::{Assets, Handle};
 use bevy::camera::RenderTarget;
+use bevy::ecs::reflect::ReflectResource;
 use bevy::ecs::resource::Resource;
 use bevy::image::Image;
+use bevy::reflect::Reflect;
 use bevy::render::render_resource::{TextureFormat, TextureUsages};
 use glam::UVec2;
 
 /// A picture that cameras draw into. [`app`](super::app) inserts one as a resource, for all cameras whose target is the primary window.
-#[derive(Resource, Debug, Clone)]
+#[derive(Resource, Reflect, Debug, Clone)]
+#[reflect(Resource, Debug, Clone)]
+#[type_path = "bevy_gs4d::testing"]
 pub struct Offscreen {
     /// The picture on the GPU: RGBA, 8 bits each, sRGB-encoded; or in [HDR](Self::hdr).
     pub image: Handle<Image>,

@@ -60,7 +60,7 @@ pub fn wait_for(app: &mut App, missing: fn(&mut World) -> Vec<UntypedAssetId>) {
 /// Runs the app until every capture and timeline in its world is loaded and drawn.
 ///
 /// # Errors
-/// [`TestingError::NoGpu`]; an app without a renderer, or without [`GaussianCapturePlugin`](crate::GaussianCapturePlugin) though it has
+/// [`TestingError::NoGpu`]; an app without a renderer, or without [`GaussianCapturePlugins`](crate::GaussianCapturePlugins) though it has
 /// captures; an asset that cannot be loaded, or not within two minutes; errors of drawing.
 pub fn settle(app: &mut App) -> Result<(), TestingError> {
     require_renderer(app)?;
@@ -136,7 +136,7 @@ pub(super) fn update(app: &mut App) -> Result<(), TestingError> {
 fn missing(world: &mut World) -> Result<Vec<String>, TestingError> {
     let has_captures = world.query::<&GaussianCapture3d>().iter(world).next().is_some();
     if has_captures && !world.contains_resource::<Assets<GaussianCapture>>() {
-        return Err(TestingError::NoPlugin { plugin: "GaussianCapturePlugin" });
+        return Err(TestingError::NoPlugin { plugin: "GaussianCapturePlugins" });
     }
     let hooks = world.get_resource_or_init::<Awaited>().clone();
     let wanted: Vec<UntypedAssetId> = hooks.0.iter().flat_map(|hook| hook(world)).collect();

@@ -28,6 +28,7 @@ use glam::{Affine3A, Vec3};
 /// ```
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
+#[type_path = "bevy_gs4d::pbr"]
 pub struct CaptureContactShadow {
     /// Fraction of the light that it removes at the center, from 0 to 1. Default: 0.6.
     pub strength: f32,

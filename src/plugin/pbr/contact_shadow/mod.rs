@@ -22,4 +22,4 @@ mod plugin;
 mod prepare;
 
 pub use component::CaptureContactShadow;
-pub(super) use plugin::ContactShadowPlugin;
+pub(super) use plugin::build;

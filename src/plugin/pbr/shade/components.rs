@@ -37,6 +37,7 @@ use bevy::reflect::std_traits::ReflectDefault;
 /// ```
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
+#[type_path = "bevy_gs4d::pbr"]
 pub struct ReceivesShadows {
     /// Factor on the linear light of each channel in full shadow; alpha is not used, a channel that is negative or not finite counts as 0.
     /// Default: 0.35 in each channel.
@@ -73,6 +74,7 @@ pub struct ReceivesShadows {
 /// ```
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
+#[type_path = "bevy_gs4d::pbr"]
 pub struct CaptureLight {
     /// The light of the surroundings under which the capture looks as trained: the brightness of the ambient light, or mean radiance times
     /// `EnvironmentMapLight::intensity` (cd/m²), times the camera's exposure. At Bevy's default exposure 1 is about 1000 cd/m². If the

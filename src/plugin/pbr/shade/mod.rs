@@ -21,4 +21,4 @@ mod plugin;
 mod uniform;
 
 pub use components::{CaptureLight, ReceivesShadows};
-pub(super) use plugin::ShadePlugin;
+pub(super) use plugin::build;

@@ -23,6 +23,7 @@ use glam::{Affine3A, Vec3A};
 ///
 /// ```
 /// use bevy::prelude::*;
+/// use bevy_gs4d::pbr::CastsShadows;
 /// use bevy_gs4d::prelude::*;
 ///
 /// fn setup(mut commands: Commands, assets: Res<AssetServer>) {
@@ -33,6 +34,7 @@ use glam::{Affine3A, Vec3A};
 /// ```
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
+#[type_path = "bevy_gs4d::pbr"]
 pub struct CastsShadows {
     /// Resolution at which the capture is drawn for shadows. All captures in one view of a light are drawn at the finest of their
     /// resolutions. Default: [`ShadowResolution::Half`].
@@ -66,6 +68,7 @@ impl Default for CastsShadows {
 /// # Examples
 ///
 /// ```
+/// use bevy_gs4d::pbr::{CastsShadows, ShadowResolution};
 /// use bevy_gs4d::prelude::*;
 ///
 /// let sharp = CastsShadows { resolution: ShadowResolution::Full, ..CastsShadows::default() };
@@ -73,6 +76,8 @@ impl Default for CastsShadows {
 /// ```
 #[derive(Reflect, Debug, Default, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[reflect(Default, Debug, Clone, PartialEq, Hash)]
+#[type_path = "bevy_gs4d::pbr"]
+#[non_exhaustive]
 pub enum ShadowResolution {
     /// The full width and height.
     Full,

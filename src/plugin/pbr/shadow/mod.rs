@@ -24,4 +24,4 @@ mod plugin;
 mod prepare;
 
 pub use casts::{CastsShadows, ShadowResolution};
-pub(super) use plugin::CaptureShadowPlugin;
+pub(super) use plugin::build;

@@ -68,7 +68,7 @@ impl Casters<'_> {
         let time = capture.time_at(placed.seconds)?;
         let view = lens.view(size, time, &caster.bounds, caster.world_from_capture, caster.bias)?;
         let level = usize::from(placed.finest_level).min(capture.coarsest());
-        let view = view.antialiased(capture.antialias_pixel(level, false));
+        let view = view.with_optics(capture.optics(level, false)?);
         let (asset, appearance, filtered) = (placed.asset, placed.appearance, placed.filtered);
         Some(Drawn { entity: caster.entity, asset, view, appearance, filtered, level })
     }

@@ -26,6 +26,7 @@ use std::collections::HashSet;
 /// # Ok::<(), InvalidTimeline>(())
 /// ```
 #[derive(Asset, TypePath, Debug, Clone, PartialEq)]
+#[type_path = "bevy_gs4d::playback"]
 pub struct Timeline {
     #[dependency]
     tracks: Vec<Track>,

@@ -5,6 +5,7 @@
 
 /// The reason why a timeline is invalid. Clips and markers are counted from 1, in the order in which they are written.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum InvalidTimeline {
     /// The timeline is empty.
     #[error("the timeline has neither clips nor markers nor a duration; give it at least one clip")]

@@ -16,6 +16,7 @@ use serde::Deserialize;
 
 /// Why a timeline could not be loaded.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum TimelineError {
     /// The asset source could not deliver the bytes.
     #[error("the file could not be read: {0}")]
@@ -46,6 +47,7 @@ pub enum TimelineError {
 
 /// Loads timelines, `.timeline.ron`. Errors: [`TimelineError`].
 #[derive(Debug, Default, TypePath)]
+#[type_path = "bevy_gs4d::playback"]
 pub struct TimelineLoader;
 
 impl AssetLoader for TimelineLoader {

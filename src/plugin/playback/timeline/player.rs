@@ -11,6 +11,7 @@ use bevy::asset::Handle;
 use bevy::camera::visibility::Visibility;
 use bevy::ecs::component::Component;
 use bevy::ecs::reflect::ReflectComponent;
+use bevy::ecs::template::FromTemplate;
 use bevy::reflect::Reflect;
 use bevy::reflect::std_traits::ReflectDefault;
 use bevy::transform::components::Transform;
@@ -30,6 +31,7 @@ use bevy::transform::components::Transform;
 ///
 /// ```
 /// use bevy::prelude::*;
+/// use bevy_gs4d::playback::TimelinePlayer;
 /// use bevy_gs4d::prelude::*;
 ///
 /// fn setup(mut commands: Commands, assets: Res<AssetServer>) {
@@ -37,8 +39,9 @@ use bevy::transform::components::Transform;
 /// }
 /// # bevy::ecs::system::assert_is_system(setup);
 /// ```
-#[derive(Component, Reflect, Debug, Default, Clone, PartialEq, Eq)]
+#[derive(Component, FromTemplate, Reflect, Debug, Default, Clone, PartialEq, Eq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
+#[type_path = "bevy_gs4d::playback"]
 #[require(Playback, PlaybackClock = PlaybackClock::manual(), Transform, Visibility)]
 pub struct TimelinePlayer(pub Handle<Timeline>);
 
@@ -50,6 +53,7 @@ pub struct TimelinePlayer(pub Handle<Timeline>);
 ///
 /// ```
 /// use bevy::prelude::*;
+/// use bevy_gs4d::playback::{TimelinePlayer, TimelineTrack};
 /// use bevy_gs4d::prelude::*;
 ///
 /// fn setup(mut commands: Commands, assets: Res<AssetServer>) {
@@ -60,6 +64,7 @@ pub struct TimelinePlayer(pub Handle<Timeline>);
 /// ```
 #[derive(Component, Reflect, Debug, Default, Clone, PartialEq, Eq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
+#[type_path = "bevy_gs4d::playback"]
 #[require(GaussianCapture3d, ClipFade, Directed)]
 pub struct TimelineTrack(pub String);
 
@@ -67,6 +72,7 @@ pub struct TimelineTrack(pub String);
 /// timeline's fades set it. Default: 1.
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
+#[type_path = "bevy_gs4d::playback"]
 pub struct ClipFade(pub f32);
 
 impl Default for ClipFade {

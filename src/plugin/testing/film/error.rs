@@ -7,6 +7,7 @@ use std::path::PathBuf;
 
 /// Why a scene could not be filmed.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum FilmError {
     /// The film has no camera or no time.
     #[error("a film needs at least one camera and one time: it has {cameras} cameras and {times} times")]
