@@ -270,8 +270,8 @@ fn invalid_options_are_refused() {
     let pth = Pth::rotating(1, 48);
     let none = ReadOptions::default();
     for (name, options) in [
-        ("time interval", ReadOptions { time_interval: Some([1.0, 1.0]), ..none.clone() }),
-        ("time interval", ReadOptions { time_interval: Some([0.0, f32::NAN]), ..none.clone() }),
+        ("time_interval", ReadOptions { time_interval: Some([1.0, 1.0]), ..none.clone() }),
+        ("time_interval", ReadOptions { time_interval: Some([0.0, f32::NAN]), ..none.clone() }),
         ("background", ReadOptions { background: Some([0.0, f32::INFINITY, 0.0]), ..none.clone() }),
         ("duration", ReadOptions { duration_seconds: Some(-1.0), ..none.clone() }),
     ] {

@@ -20,15 +20,21 @@ mod grow;
 mod identical_views;
 mod import_motion;
 mod import_pictures;
+mod kinds_of_files;
 #[cfg(feature = "offline")]
 mod loading;
 #[cfg(feature = "offline")]
+mod memory_limits;
+#[cfg(feature = "offline")]
 mod metrics;
+mod other_checkpoints;
 mod package;
 mod pick;
 #[cfg(feature = "offline")]
 mod quantize;
 mod rings;
+#[cfg(feature = "offline")]
+mod scale;
 mod scene_parts;
 #[cfg(feature = "offline")]
 mod score;

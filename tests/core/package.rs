@@ -548,6 +548,10 @@ fn invalid_training_settings_are_refused() {
         ("spatial_lr_scale: 1.", "spatial_lr_scale: -1."),
         ("pixel: Some(0.0123)", "pixel: Some(0.0)"),
         ("pixel: Some(0.0123)", "pixel: Some(NaN)"),
+        ("spatial_lr_scale: 1.", "near: 0.0, spatial_lr_scale: 1."),
+        ("spatial_lr_scale: 1.", "near: -0.2, spatial_lr_scale: 1."),
+        ("spatial_lr_scale: 1.", "near: NaN, spatial_lr_scale: 1."),
+        ("spatial_lr_scale: 1.", "near: inf, spatial_lr_scale: 1."),
         ("degree: 0", "degree: 4"),
     ] {
         let error = refusal(&parts.clone().swap(from, to).seal());
@@ -559,6 +563,18 @@ fn invalid_training_settings_are_refused() {
     }
     let error = refusal(&parts.swap("gaussians: 3", "gaussians: -3").seal());
     assert!(matches!(error, PackageError::Header(_)), "a negative count: {error}");
+}
+
+#[test]
+fn near_limits_and_filters_are_stored_and_required_unless_they_are_those_of_the_original() {
+    let plain = scene(&SMALL, 20);
+    let header = Parts::of(&pack(&plain)).header;
+    assert!(!header.contains("near") && !header.contains("mip_filter"), "left out: {header}");
+    let mut other = plain;
+    (other.trained_with.near, other.trained_with.mip_filter) = (0.003, true);
+    let parts = Parts::of(&pack(&other));
+    assert!(parts.header.contains("\"near\"") && parts.header.contains("\"mip_filter\""), "required: {}", parts.header);
+    assert_same(&read(&parts.seal()).expect("a readable package"), &other);
 }
 
 #[test]

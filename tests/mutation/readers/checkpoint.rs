@@ -22,9 +22,10 @@ pub struct Checkpoints {
 }
 
 impl Checkpoints {
-    /// Makes a seed of every model, with and without an environment map.
+    /// Makes a seed of every model, with and without an environment map, and one of gsplat.
     pub fn new() -> Self {
-        Self { seeds: checkpoints().iter().map(|pth| entries(&pth.bytes())).collect() }
+        let native = checkpoints().into_iter().map(|pth| pth.bytes());
+        Self { seeds: native.chain([gsplat()]).map(|file| entries(&file)).collect() }
     }
 }
 
@@ -68,6 +69,27 @@ pub fn checkpoints() -> Vec<Pth> {
     still.slots[11] = pth::float(5.5);
     still.slots.truncate(12);
     vec![rotating, surrounded, moving, still]
+}
+
+/// Returns a checkpoint of gsplat with color of degree 1.
+fn gsplat() -> Vec<u8> {
+    let shapes: [(&str, &[usize]); 6] = [
+        ("means", &[4, 3]),
+        ("quats", &[4, 4]),
+        ("scales", &[4, 3]),
+        ("opacities", &[4]),
+        ("sh0", &[4, 1, 3]),
+        ("shN", &[4, 3, 3]),
+    ];
+    let mut pth = Pth { slots: vec![pth::NONE.to_vec()], storages: Vec::new() };
+    let mut items = Vec::new();
+    for (name, shape) in shapes {
+        let values = (0..shape.iter().product()).map(|at: usize| (at as f32 * 0.37).sin() * 0.5).collect();
+        pth.set(0, shape, values);
+        items.extend([pth::text(name), pth.slots[0].clone()].concat());
+    }
+    let pickle = [&b"\x80\x02}("[..], &pth::text("splats"), b"}(", &items, b"uu."].concat();
+    pth.bytes_with(&pickle)
 }
 
 /// Returns the entries of an archive.

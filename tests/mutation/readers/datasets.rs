@@ -91,7 +91,7 @@ impl Reader for Datasets {
                 }
             }
         }
-        if let Ok(summary) = Summary::of(self.folder.path()) {
+        if let Ok(summary) = Summary::of(self.folder.path(), &CameraOptions::default()) {
             let picture = draw(&summary.cameras);
             if picture.pixels.len() != (picture.size.x * picture.size.y) as usize {
                 return Err(format!("is drawn with {} pixels instead of {}", picture.pixels.len(), picture.size));

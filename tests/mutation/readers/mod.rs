@@ -58,7 +58,7 @@ pub struct Kind {
 }
 
 /// The readers.
-pub static KINDS: [Kind; 38] = [
+pub static KINDS: [Kind; 39] = [
     Kind {
         name: "package",
         about: "packages (.gs4d) in every form, with filters and environment maps",
@@ -247,6 +247,13 @@ pub static KINDS: [Kind; 38] = [
         extension: "splat",
         share: 1,
         make: || Arc::new(imports::Imports::new("splat")),
+    },
+    Kind {
+        name: "ksplat",
+        about: "captures of GaussianSplats3D in every level of compression",
+        extension: "ksplat",
+        share: 1,
+        make: || Arc::new(imports::Imports::new("ksplat")),
     },
     Kind {
         name: "splatv",

@@ -7,6 +7,7 @@ use super::{Outcome, Reader};
 use crate::change::{bytes, words};
 use crate::support::random::Random;
 use bevy_gs4d::internal::offline::dataset::point_cloud::PointCloud;
+use bevy_gs4d::scene::Origin;
 use std::fs;
 use std::path::PathBuf;
 use tempfile::TempDir;
@@ -49,7 +50,7 @@ impl Reader for Points {
 
     fn read(&self, bytes: &[u8]) -> Result<Outcome, String> {
         fs::write(&self.file, bytes).expect("the folder can be written to");
-        match PointCloud::load(&self.file) {
+        match PointCloud::load(&self.file, &Origin::default()) {
             Err(error) => Ok(Outcome::Refused(error.to_string())),
             Ok(PointCloud(points)) => {
                 for point in &points {

@@ -56,6 +56,7 @@ impl Imports {
             "ply4d" => ("ply4d", Read::File, vec![ply::native(1), ply::native(32)]),
             "sequence" => ("", Read::Frames, vec![ply::sequence()]),
             "splat" => ("splat", Read::File, exported("splat", &[0])),
+            "ksplat" => ("ksplat", Read::File, [0, 1, 2].map(others::ksplat).to_vec()),
             "splatv" => ("splatv", Read::File, vec![others::splatv(1.0), others::splatv(0.0)]),
             "npz" => ("npz", Read::File, vec![others::npz()]),
             "4dgs" => ("4dgs", Read::File, [exported("4dgs", &[0, 1]), vec![tracks::file()]].concat()),

@@ -45,7 +45,7 @@ pub fn still() -> Vec<Vec<u8>> {
     ]
 }
 
-/// Returns the sources of `.sogst`, on straight and on curved paths, and of `.sog4d`.
+/// Returns the sources of `.sogst`, on straight and on curved paths, and of `.sog4d`, and frames of motion as Brush plays them.
 pub fn moving() -> Vec<Vec<u8>> {
     let common = [("f_dc", 3), ("scale", 3), ("rot", 4)];
     let sogst = "comment sogst.time_min 0\ncomment sogst.time_max 2\ncomment sogst.cov2d_scale 1 1\n";
@@ -55,7 +55,25 @@ pub fn moving() -> Vec<Vec<u8>> {
         little(sogst, &names(straight, &common)),
         little(sogst, &names(&format!("{straight} ax ay az"), &common)),
         little(sog4d, &names("x y z opacity trbf_center trbf_scale", &[&common[..], &[("motion", 3)]].concat())),
+        animated(little("", &names("x y z opacity", &common))),
     ]
+}
+
+/// Returns a file with two frames of motion more.
+fn animated(mut file: Vec<u8>) -> Vec<u8> {
+    let axes = |kind: &str| ["x", "y", "z"].map(|axis| format!("property {kind} {axis}\n")).concat();
+    let mut header = String::new();
+    for frame in 0..2 {
+        for (limit, value) in [("min", -0.5f32), ("max", 0.5)] {
+            header += &format!("element meta_delta_{limit}_{frame:05} 1\n{}", axes("float"));
+            file.extend([value; 3].iter().flat_map(|value| value.to_le_bytes()));
+        }
+        header += &format!("element delta_vertex_{frame:05} {COUNT}\n{}", axes("uchar"));
+        file.extend((0..3 * COUNT).map(|at| (at as u8).wrapping_mul(37)));
+    }
+    let at = file.windows(11).position(|window| window == b"end_header\n").expect("a header");
+    file.splice(at..at, header.bytes());
+    file
 }
 
 /// Returns Spacetime Gaussians on cubic paths.
