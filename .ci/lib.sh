@@ -3,7 +3,6 @@
 #
 # CARGO_TARGET_DIR  build folder; default: a folder of the user's cache, outside the clone, which the next run uses again
 # GS4D_DATA         folder of the trained captures; default: ../shared/data if it exists, else the tests that need captures are skipped
-# GS4D_MOTO         an interpreter of Python with the package moto, for tests of object storage; default: .ci/full makes one
 #
 # Tests add a line for each skipped test to the file that GS4D_SKIPPED names, which is set here; the summary counts these lines.
 set -euo pipefail
@@ -14,8 +13,6 @@ exec </dev/null
 # pages are built with it.
 without_bevy=(renderer offline fourdgs cli)
 with_bevy=(bevy pbr picking testing inspector viewer)
-# Those that need many further crates: only .ci/full builds them.
-of_full=(storage)
 # The features that all tests, examples and documents together need.
 everything=viewer,cli
 

@@ -85,7 +85,7 @@
 //! and fails on one that points outwards.
 //!
 //! ```text
-//!                          ┌──▶ codec ───────┐                ┌──▶ offline ──▶ cli ──▶ storage
+//!                          ┌──▶ codec ───────┐                ┌──▶ offline ──▶ cli
 //! view ─▶ gaussian ─▶ scene                  ├──▶ renderer ───┤
 //!                          └──▶ reference ───┘                └──▶ plugin
 //! ```
@@ -101,9 +101,8 @@
 //! | [`offline`] | training views, metrics, scores, pruning, quantization, levels of detail, reports: from a checkpoint to a small capture | `offline` |
 //! | `plugin` | Bevy | `bevy` |
 //! | [`cli`] | the `gs4d` command: options and printing over [`offline`] | `cli` |
-//! | `storage` | the same command, with URLs in place of files | `storage` |
 //!
-//! The last five are the gates of the crate: each is behind one feature, and nothing inside them is. It is not quite a list:
+//! The last four are the gates of the crate: each is behind one feature, and nothing inside them is. It is not quite a list:
 //!
 //! * [`codec`] and [`mod@reference`] lie side by side: one reads files, the other draws, and neither needs the other.
 //! * `plugin` lies beside [`offline`] and does not use it, so that a game compiles neither datasets nor metrics. What both need lies
@@ -120,7 +119,7 @@
 //!
 //! [`asset`] reports what happens to files that are loaded and reloaded. [`picker`] finds the Gaussian under a ray. [`stereo`] gives a
 //! head two eyes. [`inspector`] is a panel that shows and changes all of this, [`testing`] renders an app to pictures without a window.
-//! The guide, `docs/guide.md`, goes through them in the order in which a game meets them.
+//! The guide, `docs/guide.md`, goes through them in the order in which a game meets them; `docs/command.md` is the guide of the command.
 //!
 //! [`GaussianCapturePlugins`] are a group: `GaussianCapturePlugins.build().disable::<CapturePbrPlugin>()` leaves a part out. All components
 //! and resources are reflected and registered, by their public paths, so that scene files can name them.
@@ -213,8 +212,6 @@ pub mod reference;
 #[cfg(feature = "renderer")]
 pub mod renderer;
 pub mod scene;
-#[cfg(feature = "storage")]
-pub mod storage;
 pub mod view;
 
 #[cfg(feature = "bevy")]
@@ -229,3 +226,8 @@ struct Readme;
 #[cfg(all(doctest, feature = "bevy"))]
 #[doc = include_str!("../docs/guide.md")]
 struct Guide;
+
+/// The guide of the command, likewise.
+#[cfg(all(doctest, feature = "bevy"))]
+#[doc = include_str!("../docs/command.md")]
+struct CommandGuide;

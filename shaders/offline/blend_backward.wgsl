@@ -1,7 +1,7 @@
-// blend_backward: the gradient of a loss with respect to the splats of a view. Only the ATOMIC_SUMS variant uses float atomics.
+// blend_backward: the gradient of a loss with respect to the splats of a view.
 // In: the inputs and outputs of `blend`, and the gradient of the loss with respect to each pixel. Out: for each pair of splat and tile, sums
 // over the pixels of the tile. `place` writes the first pair of each splat; `pairs` computes the sums of every pair, one workgroup for each
-// tile. With ATOMIC_SUMS, `pairs` adds these sums to the sums of the splat, in no fixed order, and `place` is not needed.
+// tile.
 // CPU reference: src/reference/blend_backward.rs; equations: section 7.1 of the 4DGS model.
 //
 // The splats of a pixel are visited front to back, as in `blend`, so that both stop at the same splat. The color behind a splat is the
@@ -23,19 +23,15 @@ const CHUNK: u32 = 64u;
 @group(0) @binding(7) var color: texture_2d<f32>;
 // Expected and median depth.
 @group(0) @binding(8) var depth: texture_2d<f32>;
-// SUMS values for each pair, or for each splat with ATOMIC_SUMS. With d from pixel to center, w = alpha T and q = alpha dL/dalpha: the sums
+// SUMS values for each pair. With d from pixel to center, w = alpha T and q = alpha dL/dalpha: the sums
 // of q dx, q dy, q dx^2, q dx dy, q dy^2, q, and of w times the gradient of the pixel's red, green, blue and depth.
-#ifdef ATOMIC_SUMS
-@group(1) @binding(1) var<storage, read_write> splat_gradients: array<atomic<f32>>;
-#else
 @group(1) @binding(1) var<storage, read_write> pair_gradients: array<f32>;
-#endif
 // Gradient with respect to red, green, blue and opacity of each pixel.
 @group(1) @binding(2) var<storage, read> pixel_gradients: array<vec4<f32>>;
 // Gradient with respect to the expected depth of each pixel.
 @group(1) @binding(3) var<storage, read> depth_gradients: array<f32>;
 
-// For each splat of the chunk: center, opacity, depth; conic; color; the index of the pair or the splat to which its sums belong.
+// For each splat of the chunk: center, opacity, depth; conic; color; the index of the pair to which its sums belong.
 var<workgroup> places: array<vec4<f32>, CHUNK>;
 var<workgroup> conics: array<vec3<f32>, CHUNK>;
 var<workgroup> colors: array<vec3<f32>, CHUNK>;
@@ -89,11 +85,7 @@ fn pairs(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
             places[thread] = vec4(splat.center, splat.opacity, splat.depth);
             conics[thread] = splat.conic;
             colors[thread] = splat.color;
-#ifdef ATOMIC_SUMS
-            chunk_places[thread] = slot;
-#else
             chunk_places[thread] = pair_of(slot, tile.xy);
-#endif
         }
         let over = workgroupUniformLoad(&finished) == PIXELS;
         let was_done = done;
@@ -165,26 +157,16 @@ fn pairs(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
                     sum += terms[(k - 6u) * 256u + splat * 32u + i];
                 }
             }
-            let written = chunk_places[in_chunk + splat] * SUMS + k;
-#ifdef ATOMIC_SUMS
-            // Many splats of a tile contribute to none of its pixels.
-            if sum != 0.0 {
-                atomicAdd(&splat_gradients[written], sum);
-            }
-#else
-            pair_gradients[written] = sum;
-#endif
+            pair_gradients[chunk_places[in_chunk + splat] * SUMS + k] = sum;
         }
         // All pixels are finished: the remaining pairs contribute nothing.
         if over {
-#ifndef ATOMIC_SUMS
             for (var i = first + BATCH + thread; i < range.y; i += PIXELS) {
                 let pair = pair_of(pair_splats[i], tile.xy) * SUMS;
                 for (var k = 0u; k < SUMS; k++) {
                     pair_gradients[pair + k] = 0.0;
                 }
             }
-#endif
             break;
         }
     }

@@ -2,7 +2,7 @@
 // In: the inputs and outputs of `project` for one part, the sums of `blend_backward`. Out: the gradients of this view, added to the gradients of
 // the batch.
 // CPU reference: src/gaussian/gradient.rs; equations: sections 7.2 to 7.4 of the 4DGS model. COMPAT: as the original computes them, with
-// the deviations of section 7.5. ATOMIC_SUMS: `blend_backward` has summed over the pairs of each splat. MIP_FILTER: the opacity of each splat is
+// the deviations of section 7.5. MIP_FILTER: the opacity of each splat is
 // reduced by the filter of Mip-Splatting, in views whose training pixel is 0.
 #import gs4d::training::{TrainedRecord, TrainedScene}
 #import gs4d::types::{SplatRecord, INVISIBLE}
@@ -54,13 +54,8 @@ struct Sums {
 
 fn sums_of(slot: u32) -> Sums {
     var sums: Sums;
-#ifdef ATOMIC_SUMS
-    let first = slot;
-    let count = 1u;
-#else
     let first = first_pairs[slot];
     let count = tile_count(splats[slot].shape.w, splats[slot].color.w);
-#endif
     for (var at = SUMS * first; at < SUMS * (first + count); at += SUMS) {
         sums.center += vec2(pair_gradients[at], pair_gradients[at + 1u]);
         sums.conic += vec3(pair_gradients[at + 2u], pair_gradients[at + 3u], pair_gradients[at + 4u]);

@@ -17,7 +17,7 @@ use crate::offline::bake::{BakeSettings, Baked, bake, bake_job, check_pictures, 
 use crate::offline::engine::{Engine, EngineChoice};
 use crate::offline::evaluation::color_name;
 use crate::offline::files::Files;
-use crate::offline::fine_tune::{FineTuneSettings, GradientSums};
+use crate::offline::fine_tune::FineTuneSettings;
 use crate::offline::jobs::job::{JOB_STAGES, Job, Scoring};
 use crate::offline::jobs::plan::{Command, Source, plan};
 use crate::offline::quantize::Quality;
@@ -127,11 +127,6 @@ pub(super) struct Bake {
     /// Views of each of these steps.
     #[arg(long, value_name = "N", default_value = "2", conflicts_with = "no_fine_tune", value_parser = values::count(1000))]
     batch: usize,
-    /// Sum the gradients of fine-tuning in a fixed order, the same in every run, or by atomic additions, which differ by rounding and need
-    /// an adapter with float atomics.
-    #[arg(long, help_heading = "Experimental", value_name = "HOW", default_value = "deterministic", conflicts_with = "no_fine_tune",
-        value_parser = values::one_of(&GradientSums::NAMES))]
-    sums: GradientSums,
     /// Train an exposure for each camera wherever Gaussians are trained, as gs4d train does, for pictures whose cameras differ in exposure or
     /// white balance. The package has their mean exposure.
     #[arg(long, conflicts_with = "no_fine_tune")]
@@ -377,7 +372,6 @@ impl Bake {
             fine_tune: (!self.no_fine_tune).then(|| FineTuneSettings {
                 steps: self.steps,
                 batch: self.batch,
-                sums: self.sums,
                 exposure: self.exposure,
                 ..FineTuneSettings::default()
             }),

@@ -27,7 +27,6 @@ mod interrupt;
 mod mask;
 mod near;
 mod note;
-mod places;
 mod plain;
 mod progress;
 mod prune;
@@ -40,15 +39,11 @@ mod synth;
 mod system;
 mod table;
 mod train;
-pub(crate) mod urls;
 mod usage;
 
-use crate::offline::{names, unfinished};
+use crate::offline::unfinished;
 use clap::{Parser, Subcommand};
 use failure::Failure;
-use note::note;
-use places::ThisMachine;
-pub(crate) use places::{Opened, PlaceError, Places};
 use report::Report;
 use std::env;
 use std::ffi::OsString;
@@ -129,29 +124,17 @@ impl Verb {
     }
 }
 
-/// Runs the command that the process was started with, on the files of this machine. Returns its exit code.
+/// Runs the command that the process was started with. Returns its exit code.
 pub fn run() -> ExitCode {
-    run_in(&mut ThisMachine)
-}
-
-/// Runs the command that the process was started with, on files in these places. Returns its exit code.
-pub(crate) fn run_in(places: &mut dyn Places) -> ExitCode {
     let arguments: Vec<OsString> = env::args_os().collect();
-    let (cli, values) = match usage::parse::<Cli>(&arguments) {
-        Ok(parsed) => parsed,
+    let cli = match usage::parse::<Cli>(&arguments) {
+        Ok(cli) => cli,
         Err(code) => return code,
     };
     note::silence_progress(cli.json);
     let (report, failed) = report_of(|| {
         interrupt::install(cli.json)?;
-        let failure = |error: PlaceError| Failure::new(error.to_string());
-        let Opened { arguments, names } = places.open(arguments, &values, &note).map_err(failure)?;
-        names.iter().for_each(|(copies, origin)| names::show(copies, origin));
-        let report = Cli::try_parse_from(arguments)?.verb.run()?;
-        // The results of interrupted work are brought to their place, too.
-        let _deferred = interrupt::defer();
-        places.close(&note).map_err(failure)?;
-        Ok(report)
+        cli.verb.run()
     });
     interrupt::begin_report();
     let printed = report.print(cli.json);
@@ -176,46 +159,8 @@ fn report_of(verb: impl FnOnce() -> Result<Report, Failure>) -> (Report, u8) {
 
 #[cfg(test)]
 mod tests {
-    use super::urls::{NamedUrl, OUTPUTS, OUTPUTS_OF_VERBS, urls};
     use super::*;
-    use clap::CommandFactory;
     use std::io;
-
-    fn named(arguments: &[&str]) -> Result<Vec<NamedUrl>, String> {
-        let arguments = ["gs4d"].iter().chain(arguments);
-        urls(&Cli::command().try_get_matches_from(arguments).expect("valid arguments"))
-    }
-
-    #[test]
-    fn urls_of_inputs_and_outputs_are_told_apart() {
-        let url = |url: &str, is_output| NamedUrl { url: url.to_owned(), is_output };
-        let bake = named(&["bake", "s3://a/c.pth", "--data", "s3://a/data", "-os3://b/out.gs4d"]).expect("all differ");
-        let expected = [url("s3://a/c.pth", false), url("s3://a/data", false), url("s3://b/out.gs4d", true)];
-        assert_eq!(bake, expected, "checkpoint, dataset and package");
-        let cameras = named(&["info", "data", "--cameras", "s3://b/cameras.png"]).expect("all differ");
-        assert_eq!(cameras, [url("s3://b/cameras.png", true)], "a picture that is written");
-        let cameras = named(&["render", "a.gs4d", "--cameras", "s3://b/c.json", "--out", "x"]).expect("all differ");
-        assert_eq!(cameras, [url("s3://b/c.json", false)], "a file that is read");
-        let refused = named(&["convert", "s3://b/a.gs4d", "s3://b/a.gs4d"]).expect_err("written over itself");
-        assert!(refused.starts_with("s3://b/a.gs4d: is an input"), "the URL and its fault: {refused}");
-    }
-
-    #[test]
-    fn every_argument_that_names_an_output_is_known() {
-        let mut outputs = 0;
-        for verb in Cli::command().get_subcommands() {
-            for argument in verb.get_arguments().filter(|argument| argument.get_value_names().is_some()) {
-                let help = argument.get_help().map(ToString::to_string).unwrap_or_default();
-                let begins = ["Write ", "Draw the cameras", "Folder for "].iter().any(|words| help.starts_with(words));
-                let id = argument.get_id().as_str();
-                let is_known = OUTPUTS.contains(&id) || OUTPUTS_OF_VERBS.contains(&(verb.get_name(), id));
-                let writes = begins || help.contains(" to write");
-                assert!(is_known || !writes, "{} {id} is an output: {help}", verb.get_name());
-                outputs += usize::from(writes && is_known);
-            }
-        }
-        assert!(outputs > 15, "{outputs} outputs are found by their help");
-    }
 
     #[test]
     fn panics_are_reported_as_other_failures() {

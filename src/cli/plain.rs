@@ -1,20 +1,19 @@
 //! Escapes of control characters in printed text.
 //!
 //! In: reports and notes, which may contain names from files. Out: the same text with escapes in place of characters that control a
-//! terminal, and the names of files elsewhere in place of those of their copies. All output of the command passes through this module.
+//! terminal. All output of the command passes through this module.
 
 use crate::codec::text::{escaped, is_obeyed};
-use crate::offline::names;
 
 /// Returns lines for a terminal.
 pub(super) fn lines(text: &str) -> String {
-    names::shown(text).split('\n').map(escaped).collect::<Vec<_>>().join("\n")
+    text.split('\n').map(escaped).collect::<Vec<_>>().join("\n")
 }
 
 /// Returns a JSON document for a terminal. Control characters occur only in its strings, where JSON allows escapes.
 pub(super) fn json(document: &str) -> String {
     let mut plain = String::with_capacity(document.len());
-    for c in names::shown(document).chars() {
+    for c in document.chars() {
         if is_obeyed(c) && c != '\n' {
             // No control character is above U+FFFF.
             plain += &format!("\\u{:04x}", u32::from(c));

@@ -5,20 +5,16 @@
 
 use super::failure::{FAILED, Failure};
 use super::report::Report;
-use clap::{ArgMatches, Parser};
+use clap::Parser;
 use std::ffi::OsString;
 use std::process::ExitCode;
 
-/// Parses the arguments of the process. Returns the options, and the values as they were given.
+/// Parses the arguments of the process. Returns the options.
 ///
 /// # Errors
 /// The exit code, if help is requested or the arguments are invalid. Help or the error has been printed.
-pub(super) fn parse<C: Parser>(arguments: &[OsString]) -> Result<(C, ArgMatches), ExitCode> {
-    let parsed = C::command().try_get_matches_from(arguments).and_then(|values| {
-        let options = C::from_arg_matches(&values).map_err(|error| error.format(&mut C::command()))?;
-        Ok((options, values))
-    });
-    parsed.map_err(|error| {
+pub(super) fn parse<C: Parser>(arguments: &[OsString]) -> Result<C, ExitCode> {
+    C::try_parse_from(arguments).map_err(|error| {
         let failed = error.use_stderr();
         // The exit code does not depend on whether printing succeeds.
         if failed && arguments.iter().any(|argument| argument == "--json") {

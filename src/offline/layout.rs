@@ -124,14 +124,12 @@ pub struct AdamUniforms {
     pub count: u32,
     /// Four-vectors of each Gaussian.
     pub stride: u32,
-    /// 1: only Gaussians that are visible in a view of the batch are updated.
-    pub sparse: u32,
     /// Number of values of each Gaussian that are updated; the values after these keep their value.
     pub values: u32,
-    /// Index of the first Gaussian of the buffer among all.
-    pub first: u32,
     /// Unused.
     pub padding: u32,
+    /// Unused.
+    pub end: [u32; 2],
 }
 
 /// Index of the first Gaussian in the `notes` of `project_backward`, after three words about gradients that are not finite.

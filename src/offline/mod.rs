@@ -28,7 +28,6 @@
 //! | `files` | refuses outputs that are inputs or cannot be written, before anything is computed |
 //! | `shard` | divides work among machines, and puts their parts together |
 //! | `stages`, `store`, `stored` | run stages and keep their results, from which interrupted work resumes |
-//! | `names` | the names of files that are copies of files elsewhere |
 //! | `unfinished` | lists the files and folders that are removed if a process ends before its work |
 //! | `export` | writes files of other makes |
 //! | [`orbit`], `render` | draws a scene from all sides, many pictures at a time |
@@ -55,7 +54,6 @@ pub(crate) mod jobs;
 pub(crate) mod layout;
 pub(crate) mod memory_check;
 pub mod metrics;
-pub(crate) mod names;
 mod node;
 pub mod orbit;
 mod package_size;

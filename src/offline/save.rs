@@ -24,7 +24,7 @@ const MAX_LINKS: usize = 40;
 /// A scene that the format cannot hold, a folder that cannot be written to, a full disk, a package that cannot be read back.
 pub fn save(path: &Path, scene: &GaussianScene, settings: &WriteSettings) -> Result<(), CodecError> {
     let part = part(path, |writer| codec::write(writer, path, scene, settings), read_back)?;
-    temporary_file::replace(part.into_iter().collect(), true)
+    temporary_file::replace(part.into_iter().collect())
 }
 
 /// Checks that a package that was just written can be read.
@@ -73,7 +73,7 @@ where
     CodecErrorKind: From<E>,
 {
     let part = part(path, write, |_| Ok(()))?;
-    temporary_file::replace(part.into_iter().collect(), true)
+    temporary_file::replace(part.into_iter().collect())
 }
 
 /// Writes files that belong together, as [`write_beside`] does: no existing file is replaced before all are complete. Files after
@@ -83,7 +83,7 @@ where
 /// A folder that cannot be written to, a full disk.
 pub(super) fn write_together(files: &[(&Path, &[u8])]) -> Result<(), CodecError> {
     let part = |&(path, bytes): &(&Path, &[u8])| part(path, |file| file.write_all(bytes), |_| Ok(())).transpose();
-    temporary_file::replace(files.iter().filter_map(part).collect::<Result<_, _>>()?, true)
+    temporary_file::replace(files.iter().filter_map(part).collect::<Result<_, _>>()?)
 }
 
 /// Writes a complete temporary file that is to replace the output `path`. Returns it with the path that it replaces; `None` if a device or

@@ -44,6 +44,3 @@ pub const COMPAT_WITHOUT_TIME: &[&str] = &["COMPAT", "WITHOUT_TIME"];
 
 /// The definition of `project_backward` for captures with the filter of Mip-Splatting, whose gradient it includes.
 pub const MIP_FILTER: &[&str] = &["MIP_FILTER"];
-
-/// The definition of `blend_backward` and `project_backward` that sums by float atomics, for devices that support them.
-pub const ATOMIC_SUMS: &[&str] = &["ATOMIC_SUMS"];

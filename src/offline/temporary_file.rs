@@ -65,12 +65,11 @@ pub(crate) fn create(target: PathBuf) -> io::Result<Part> {
 
 /// Replaces outputs by complete files; each is given with the path of its output as the user has named it. Outputs after the first belong
 /// to the first: they are removed before the first is replaced, so that they are never beside another first output than their own, even if
-/// the process is killed. `are_results` says whether they are results of the work, which are listed if it is interrupted; copies of inputs
-/// are not.
+/// the process is killed. They are listed if the work is interrupted.
 ///
 /// # Errors
 /// The first output that cannot be replaced, by name.
-pub(crate) fn replace(mut parts: Vec<(Part, PathBuf)>, are_results: bool) -> Result<(), CodecError> {
+pub(crate) fn replace(mut parts: Vec<(Part, PathBuf)>) -> Result<(), CodecError> {
     // Unlocked before the parts are dropped.
     let mut unfinished = unfinished::lock();
     let at = |path: &Path, error: io::Error| CodecError { path: path.to_owned(), kind: error.into() };
@@ -84,9 +83,7 @@ pub(crate) fn replace(mut parts: Vec<(Part, PathBuf)>, are_results: bool) -> Res
         fs::rename(&part.path, &part.target).map_err(|error| at(path, error))?;
         part.has_replaced = true;
         unfinished.take_file(&part.path);
-        if are_results {
-            unfinished.add_output(path);
-        }
+        unfinished.add_output(path);
     }
     Ok(())
 }
@@ -149,7 +146,7 @@ mod tests {
             [&package, &report, &other].map(part).into()
         };
         let texts = || [&package, &report, &other].map(|path| fs::read_to_string(path).ok());
-        replace(parts("first"), true).expect("nothing is in the way");
+        replace(parts("first")).expect("nothing is in the way");
         assert_eq!(
             texts(),
             [Some("first".to_owned()), Some("first".to_owned()), Some("first".to_owned())],
@@ -157,7 +154,7 @@ mod tests {
         );
         fs::remove_file(&other).expect("the file exists");
         fs::create_dir(&other).expect("the folder can be written to");
-        let error = replace(parts("second"), true).expect_err("a folder is in the way").to_string();
+        let error = replace(parts("second")).expect_err("a folder is in the way").to_string();
         assert!(error.contains("out.html"), "the error names the output: {error}");
         assert_eq!(texts(), [Some("first".to_owned()), None, None], "the old package is beside no report");
         assert_eq!(fs::read_dir(folder.path()).expect("the folder").count(), 2, "no temporary file is left");

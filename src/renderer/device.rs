@@ -47,9 +47,9 @@ impl GpuContext {
     /// Opens a device on an adapter, with its limits.
     async fn of(adapter: wgpu::Adapter) -> Result<Self, GpuError> {
         let info = adapter.get_info();
-        // Timestamps are for benchmarks, subgroups for tile bins, float atomics for training. All are optional.
+        // Timestamps are for benchmarks, subgroups for tile bins. Both are optional.
         let timestamps = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES;
-        let wanted_features = timestamps | wgpu::Features::SUBGROUP | wgpu::Features::SHADER_FLOAT32_ATOMIC;
+        let wanted_features = timestamps | wgpu::Features::SUBGROUP;
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("gs4d"),
             required_features: adapter.features() & wanted_features,

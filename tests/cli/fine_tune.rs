@@ -69,7 +69,7 @@ fn training_raises_the_quality_of_a_pruned_scene() {
     let command = arguments!["finetune", &out, "--data", &lesson.data, "-o", &small];
     let coded = ["--steps", "4", "--compress", "balanced", "--compress-steps", "10", "--json"];
     let terms = ["--motion-weight", "--rigid-weight", "--opacity-weight"];
-    let terms = terms.into_iter().flat_map(|term| [term, "1e-6"]).chain(["--sparse"]).map(Into::into).collect();
+    let terms = terms.into_iter().flat_map(|term| [term, "1e-6"]).map(Into::into).collect();
     gs4d(&[command.to_vec(), coded.map(Into::into).to_vec(), terms].concat()).json();
     let info = gs4d(&arguments!["info", &small, "--json"]).json();
     assert_eq!((info["gaussians"].as_u64(), info["form"].as_str()), (Some(500), Some("packed")), "{info}");
@@ -167,22 +167,6 @@ fn the_report_of_an_interrupted_run_says_that_the_package_is_not_compressed() {
         "the document has both states: {json}"
     );
     assert_eq!(json["psnr"], json["best"]["psnr"], "the PSNR is that of the written parameters: {json}");
-}
-
-#[test]
-fn atomic_sums_train_or_are_refused_with_a_remedy() {
-    let Some(lesson) = lesson() else { return };
-    let (out, before) = (lesson.path("out.gs4d"), lesson.left());
-    let command = arguments!["finetune", &lesson.pruned, "--data", &lesson.data, "-o", &out, "--steps", "2"];
-    let run = gs4d(&[command.to_vec(), arguments!["--sums", "atomic"].to_vec()].concat());
-    if run.code == Some(0) {
-        let info = gs4d(&arguments!["info", &out, "--json"]).json();
-        assert_eq!(info["gaussians"].as_u64(), Some(500), "the scene is trained: {info}");
-    } else {
-        run.must_fail("--sums deterministic");
-        assert_eq!(lesson.left(), before, "no file is left");
-    }
-    gs4d(&[command.to_vec(), arguments!["--sums", "sorted"].to_vec()].concat()).must_fail("--sums");
 }
 
 #[test]

@@ -34,8 +34,6 @@ mod signals;
 // The limit of the address space is set by a shell and read from `/proc`.
 #[cfg(target_os = "linux")]
 mod sizes;
-#[cfg(feature = "storage")]
-mod storage;
 mod train;
 
 #[path = "../support"]

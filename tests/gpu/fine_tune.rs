@@ -3,7 +3,6 @@
 //! In: the golden scenes with their gradients; synthetic scenes. Out: proof that gradients, loss and optimizer are right, and that training
 //! lowers the loss. Skipped where there is no GPU.
 
-use crate::support::skip::skip;
 use crate::support::{golden, gpu};
 use bevy_gs4d::gaussian::{GradientMode, Harmonics, Parameters, SliceSettings};
 use bevy_gs4d::internal::gaussian::ParameterGradient;
@@ -14,7 +13,7 @@ use bevy_gs4d::internal::offline::fine_tune::{
 use bevy_gs4d::internal::reference::{PixelGradients, gradients};
 use bevy_gs4d::internal::scene::packed::encode::Bits;
 use bevy_gs4d::offline::dataset::CoveredImage;
-use bevy_gs4d::offline::fine_tune::{GradientSums, Rates, Terms};
+use bevy_gs4d::offline::fine_tune::{Rates, Terms};
 use bevy_gs4d::offline::metrics::SquaredError;
 use bevy_gs4d::offline::quantize::{CompressSettings, compress};
 use bevy_gs4d::renderer::Headless;
@@ -390,36 +389,6 @@ fn the_loss_and_its_gradient_match_the_cpu_reference() {
 }
 
 #[test]
-fn atomic_sums_match_sums_in_a_fixed_order() {
-    let Some(mut headless) = gpu::headless() else { return };
-    if let Err(error) = GradientSums::Atomic.check(&headless) {
-        skip(error);
-        return;
-    }
-    let lesson = Lesson::new(&mut headless);
-    for mode in [GradientMode::Exact, GradientMode::Compat] {
-        let gradients = |sums| {
-            let mut trainer =
-                Trainer::with_sums(&mut headless, lesson.disturbed(), mode, sums).expect("the scene can be trained");
-            let images = lesson.upload(&trainer);
-            // The sums of each view begin at zero.
-            for index in [0, 3] {
-                trainer.accumulate(&[lesson.sample(&images, index)], 0.2).expect("the view is drawn");
-            }
-            let found = trainer.gradients().expect("gradients can be read");
-            tensors(&trained(&found).parameters, &trained(&found).harmonics)
-        };
-        let [expected, found] = [GradientSums::Deterministic, GradientSums::Atomic].map(gradients);
-        for ((name, found), (_, expected)) in found.iter().zip(&expected) {
-            let error = relative_error(found, expected);
-            println!("{mode:?} {name:14} {error:.1e}");
-            assert!(expected.iter().any(|&value| value != 0.0), "{mode:?}: {name} has a gradient");
-            assert!(error <= 1e-4, "{mode:?}: {name} differs by {error:.1e}");
-        }
-    }
-}
-
-#[test]
 fn gradients_of_batches_add_up_and_each_view_has_its_share_of_its_batch() {
     let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new(&mut headless);
@@ -588,55 +557,6 @@ fn the_mask_term_removes_splats_outside_the_images() {
     let (with, without) = (left_after(1.0), left_after(0.0));
     assert!(with < 0.6, "a fraction of {with:.3} remains outside the images, expected below 0.6");
     assert!(without > 0.7, "without a weight a fraction of {without:.3} remains, expected above 0.7");
-}
-
-#[test]
-fn sparse_steps_do_not_change_gaussians_that_no_view_shows() {
-    let Some(mut headless) = gpu::headless() else { return };
-    let lesson = Lesson::new(&mut headless);
-    let mut train = |sparse: bool| {
-        let mut trainer =
-            Trainer::new(&mut headless, lesson.disturbed(), GradientMode::Exact).expect("the scene can be trained");
-        trainer.set_terms(Terms { opacity: 0.01, ..Terms::default() }).expect("the weight is right");
-        trainer.set_sparse(sparse);
-        let images = lesson.upload(&trainer);
-        // Every Gaussian that a view shows gets moments.
-        let all: Vec<Sample<'_>> = (0..6).map(|index| lesson.sample(&images, index)).collect();
-        trainer.accumulate(&all, 0.2).expect("the views are drawn");
-        trainer.step(&Rates::OURS, 1.0, 1).expect("the step succeeds");
-        let (scene, before) =
-            (trainer.scene().expect("the scene can be read"), trainer.state().expect("the state can be read"));
-        trainer.accumulate(&all[..1], 0.2).expect("the view is drawn");
-        let gradients = trainer.gradients().expect("gradients can be read");
-        trainer.accumulate_terms(1).expect("the terms are added");
-        trainer.step(&Rates::OURS, 1.0, 2).expect("the step succeeds");
-        let left = trainer.gradients().expect("gradients can be read");
-        let left = tensors(&trained(&left).parameters, &trained(&left).harmonics);
-        assert!(left.iter().all(|(_, values)| values.iter().all(|&v| v == 0.0)), "gradients are zero after the step");
-        let after = trainer.state().expect("the state can be read");
-        let changed = move |index: usize| {
-            let own = |bytes: &Vec<u8>| {
-                let size = bytes.len() / 400;
-                bytes[index * size..][..size].to_vec()
-            };
-            let pairs = before.buffers.iter().zip(&after.buffers);
-            pairs.filter(|(before, after)| own(before) != own(after)).count()
-        };
-        let shown: Vec<bool> = trained(&gradients).parameters.opacity_logit.iter().map(|&g| g != 0.0).collect();
-        let scene = scene.into_runtime().expect("the scene can be drawn");
-        // Well below the marginal cut-off at that time.
-        let absent = (0..400).filter(|&index| scene.gaussian(index).marginal(lesson.views[0].time) < 0.04);
-        (absent.collect::<Vec<usize>>(), shown, changed)
-    };
-    let (absent, shown, changed) = train(true);
-    assert!(absent.len() > 20, "more than 20 Gaussians are absent: {}", absent.len());
-    assert!(absent.iter().all(|&index| changed(index) == 0), "values and moments of absent Gaussians do not change");
-    let mut shown = (0..400).filter(|&index| shown[index]);
-    assert!(shown.clone().count() > 20, "more than 20 Gaussians are shown");
-    assert!(shown.all(|index| changed(index) > 0), "all shown Gaussians change");
-    let (absent, _, changed) = train(false);
-    let moved = absent.iter().filter(|&&index| changed(index) > 0).count();
-    assert!(moved > 20, "without sparse steps more than 20 absent Gaussians change: {moved}");
 }
 
 #[test]

@@ -152,7 +152,7 @@ fn mirrors() -> [Mirror; 21] {
         mirror!(LossUniforms { background, size, tiles, share, similarity_share, mask_weight, padding }),
         mirror!(ExposureUniforms { background, size, tiles, share, pull, camera, padding }),
         mirror!(TiedColors { count, stride, stages, padding }),
-        mirror!(AdamUniforms { rates, correction, count, stride, sparse, values, first, padding }),
+        mirror!(AdamUniforms { rates, correction, count, stride, values, padding, end }),
         mirror!(TermWeights { motion, rigid, opacity, scale, falloff }),
         mirror!(NoiseUniforms { count, seed, strength, least_log_scale_t }),
         mirror!(DropoutUniforms { count, seed, below, first }),
@@ -257,7 +257,7 @@ fn constant(module: &Module, name: &str) -> f64 {
 fn constants_of_the_passes_match_the_host() {
     let modules = modules();
     let threads = 256;
-    let expected: [(&str, &str, f64); 16] = [
+    let expected: [(&str, &str, f64); 15] = [
         ("activate", "BLOCK", BLOCK.into()),
         ("activate", "PER_THREAD", (BLOCK / threads).into()),
         ("sort", "BLOCK", BLOCK.into()),
@@ -269,7 +269,6 @@ fn constants_of_the_passes_match_the_host() {
         ("score", "PIXELS", (TILE_SIZE * TILE_SIZE).into()),
         ("blend_backward", "PIXELS", (TILE_SIZE * TILE_SIZE).into()),
         ("project_backward", "FIRST_SEEN", FIRST_SEEN.into()),
-        ("adam", "FIRST_SEEN", FIRST_SEEN.into()),
         ("statistics", "FIRST_SEEN", FIRST_SEEN.into()),
         ("exposure", "SIDE", TILE_SIZE.into()),
         ("regularize", "NEIGHBORS", NEIGHBORS as f64),

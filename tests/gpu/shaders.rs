@@ -4,7 +4,7 @@
 //! with optional capabilities need these capabilities.
 
 use crate::support::composed::{compose, pass_names};
-use bevy_gs4d::internal::offline::shaders::{ATOMIC_SUMS, COMPAT, COMPAT_WITHOUT_TIME, MIP_FILTER};
+use bevy_gs4d::internal::offline::shaders::{COMPAT, COMPAT_WITHOUT_TIME, MIP_FILTER};
 use bevy_gs4d::internal::renderer::global_sort::AtOnce;
 use bevy_gs4d::internal::renderer::shaders::{BINNED, COPIED_INSTANCE, MULTISAMPLED, SHADERS, SUBGROUPS_OF_32};
 use bevy_gs4d::internal::renderer::tile_bins::{
@@ -55,7 +55,6 @@ fn every_pass_composes_and_is_valid() {
         let uses = |own: &[&str]| definitions.iter().any(|definition| own.contains(definition));
         let mut capabilities = Capabilities::SHADER_FLOAT16_IN_FLOAT32;
         capabilities.set(Capabilities::SUBGROUP, uses(SUBGROUPS_OF_32));
-        capabilities.set(Capabilities::SHADER_FLOAT32_ATOMIC, uses(ATOMIC_SUMS));
         validate(name, &compose(name, definitions).map_err(|error| error.to_string())?, capabilities)
     };
     let binned = Storage::ALL
@@ -82,8 +81,7 @@ fn every_pass_composes_and_is_valid() {
     let definitions: Vec<_> = storages
         .into_iter()
         .chain(at_once)
-        .chain([MULTISAMPLED.to_vec(), COMPAT.to_vec(), COMPAT_WITHOUT_TIME.to_vec()])
-        .chain([ATOMIC_SUMS.to_vec(), [COMPAT, ATOMIC_SUMS].concat(), MIP_FILTER.to_vec()])
+        .chain([MULTISAMPLED, COMPAT, COMPAT_WITHOUT_TIME, MIP_FILTER].map(<[&str]>::to_vec))
         .chain(binned)
         .chain(copied)
         .chain(blending)

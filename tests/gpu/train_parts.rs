@@ -105,7 +105,6 @@ fn assert_same(
 #[test]
 fn a_scene_of_two_parts_is_trained_to_the_same_bytes_as_one_of_a_single_part() {
     let prepare = |trainer: &mut Trainer<'_>| {
-        trainer.set_sparse(true);
         let terms = Terms { opacity: 0.01, scale: 0.01, ..Terms::default() };
         trainer.set_terms(terms).expect("the weights are right");
     };

@@ -91,13 +91,10 @@ struct AdamUniforms {
     count: u32,
     // Four-vectors of each Gaussian.
     stride: u32,
-    // 1: only Gaussians that are visible in a view of the batch are updated.
-    sparse: u32,
     // Number of values of each Gaussian that are updated.
     values: u32,
-    // Index of the first Gaussian of the buffer among all.
-    first: u32,
     padding: u32,
+    end: vec2<u32>,
 }
 
 // Input of `regularize`: the weights of its terms for each Gaussian.

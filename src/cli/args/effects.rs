@@ -141,8 +141,7 @@ const OF_TRAINED: &[&str] = &[
 /// The other options of [`CheckpointArgs`](super::CheckpointArgs).
 const OF_BOTH: &[&str] = &["--time-interval", "--background", "--duration"];
 /// The options of verbs that choose an engine which have an effect on a GPU alone.
-const OF_GPU: &[&str] =
-    &["--adapter", "--checks", "--renderer", "--steps", "--batch", "--rounds", "--sums", "--exposure"];
+const OF_GPU: &[&str] = &["--adapter", "--checks", "--renderer", "--steps", "--batch", "--rounds", "--exposure"];
 
 /// Every option that does not always have an effect.
 pub(crate) const RULES: &[Rule] = &[
@@ -395,7 +394,7 @@ pub(crate) const RULES: &[Rule] = &[
     Rule { need: Need::Degrees, options: &["--raise-degree-every"], reason: "with --sh-degree 0: no degree is raised" },
     Rule {
         need: Need::Tuning,
-        options: &["--steps", "--batch", "--rounds", "--sums", "--exposure"],
+        options: &["--steps", "--batch", "--rounds", "--exposure"],
         reason: "where no Gaussians are trained: that needs the trained form, and the images of all training views",
     },
     Rule { need: Need::Shards, options: &["--shards"], reason: "without --plan or --only score" },

@@ -3,7 +3,7 @@
 //! In: options. Out: [`FineTuneSettings`], in which the verb sets the others.
 
 use super::values;
-use crate::offline::fine_tune::{Behind, FineTuneSettings, GradientSums, Terms};
+use crate::offline::fine_tune::{Behind, FineTuneSettings, Terms};
 
 /// How each step is made.
 #[derive(clap::Args)]
@@ -20,9 +20,6 @@ pub(crate) struct TrainingArgs {
     /// Weight, in the loss, of motion that differs from that of the 20 nearest Gaussians: the original's rigid term.
     #[arg(long, help_heading = "Experimental", value_name = "WEIGHT", default_value = "0", value_parser = values::not_negative)]
     rigid_weight: f64,
-    /// Do not change Gaussians, and their state in the optimizer, in steps whose views do not show them.
-    #[arg(long, help_heading = "Experimental")]
-    sparse: bool,
     /// Train an exposure for each camera: gains, mixtures and offsets of red, green and blue, for pictures whose cameras differ in exposure or
     /// white balance. OUT has the mean exposure of the training cameras; exposures are not stored in it, and no evaluation uses them.
     #[arg(long)]
@@ -36,10 +33,6 @@ pub(crate) struct TrainingArgs {
     /// Seed of all random choices, such as the order of views and random backgrounds.
     #[arg(long, value_name = "N", default_value = "0")]
     pub seed: u64,
-    /// Sums of gradients: deterministic, in a fixed order with the same result in every run, or atomic, which differ by rounding and need an
-    /// adapter with float atomics.
-    #[arg(long, help_heading = "Experimental", value_name = "HOW", default_value = "deterministic", value_parser = values::one_of(&GradientSums::NAMES))]
-    sums: GradientSums,
 }
 
 const BEHIND: [(&str, Behind); 2] = [("random", Behind::Random), ("fixed", Behind::Fixed)];
@@ -55,12 +48,10 @@ impl TrainingArgs {
                 rigid: self.rigid_weight,
                 ..Terms::default()
             },
-            sparse: self.sparse,
             exposure: self.exposure,
             behind: self.behind,
             patience: self.patience,
             seed: self.seed,
-            sums: self.sums,
             ..FineTuneSettings::default()
         }
     }

@@ -14,27 +14,23 @@ use crate::offline::splits::Splits;
 use crate::offline::{OfflineError, Progress};
 use crate::scene::GaussianScene;
 
-/// Checks everything that depends on the settings, the views and the engine alone. `is_trainable`: whether Gaussians of this form can be trained on
-/// these views.
+/// Checks everything that depends on the settings, the views and the engine alone.
 ///
 /// # Errors
-/// As [`require_validation`]; pictures that do not fit the memory or the GPU, an adapter that cannot sum gradients as wanted.
+/// As [`require_validation`]; pictures that do not fit the memory or the GPU.
 pub(super) fn check(
     settings: &BakeSettings,
     splits: &Splits,
     views: &[TrainingView],
     engine: &Engine,
-    is_trainable: bool,
 ) -> Result<(), OfflineError> {
     require_validation(settings, splits)?;
     Pictures::looked_at(views).require(engine.headless(), BY_RESOLUTION)?;
     Pictures::compared(&splits.validation).require(engine.headless(), BY_RESOLUTION)?;
     // The test views, which are of the same sizes.
     Pictures::evaluated(views, MetricSet::ALL, true).require(engine.headless(), BY_RESOLUTION)?;
-    let Some((tuning, headless)) = settings.fine_tune.as_ref().zip(engine.headless()) else { return Ok(()) };
-    TrainingImages::require_room(&splits.train, &splits.validation, headless)?;
-    if is_trainable {
-        tuning.sums.check(headless)?;
+    if let Some(headless) = engine.headless().filter(|_| settings.fine_tune.is_some()) {
+        TrainingImages::require_room(&splits.train, &splits.validation, headless)?;
     }
     Ok(())
 }

@@ -32,7 +32,7 @@ pub(crate) fn check_pictures(
     Files::default().reads_data(&settings.data).writes_regular(&settings.checkpoint, "gs4d").check()?;
     let Divided { splits, views, trained_with, playback } = training.divide(progress)?;
     require_images(&splits.validation)?;
-    check(settings, &splits, &views, engine, true)?;
+    check(settings, &splits, &views, engine)?;
     // The capture has at least the bytes of one without Gaussians and without an environment map.
     let one = synthesize(&SynthSettings { count: 1, ..SynthSettings::default() });
     let scene = GaussianScene { trained_with, playback, ..one };

@@ -59,7 +59,7 @@ impl<'a> Inputs<'a> {
         let splits = Splits::open(data, options, &scene.trained_with, progress)?;
         progress.note(&splits.to_string());
         let views = splits.all_training(&scene.trained_with, progress)?;
-        check(settings, &splits, &views, engine, obstacle(&scene.form, &views).is_none())?;
+        check(settings, &splits, &views, engine)?;
         scene.trained_with.validation = Some(splits.to_string());
         let read = format!("{:?} {:?} {:?}", scene.trained_with, scene.playback, settings.background);
         let scene_key = Key::of_files(&[checkpoint])?.and(env!("CARGO_PKG_VERSION")).and(&read);

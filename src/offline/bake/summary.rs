@@ -8,7 +8,6 @@ use crate::codec::package;
 use crate::gaussian::Gaussian;
 use crate::offline::OfflineError;
 use crate::offline::bake_settings::BakeSettings;
-use crate::offline::names;
 use crate::offline::quantize::{Quality, broken_promises};
 use crate::offline::report::{
     Activity, BakeReport, Change, SectionSize, StageTime, VarianceHistogram, even_times, filter_shares,
@@ -55,9 +54,9 @@ impl Facts<'_> {
         };
         Ok(BakeReport {
             generator: format!("gs4d {}", env!("CARGO_PKG_VERSION")),
-            checkpoint: names::shown(&checkpoint.display().to_string()),
-            data: names::shown(&data.display().to_string()),
-            package: names::shown(&out.display().to_string()),
+            checkpoint: checkpoint.display().to_string(),
+            data: data.display().to_string(),
+            package: out.display().to_string(),
             gaussians: Change { before: self.before.len(), after: self.after.len() },
             bytes: Change { before: original.len(), after: self.package.len() as u64 },
             choices,

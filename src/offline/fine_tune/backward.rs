@@ -5,7 +5,6 @@
 
 use super::parameters::ParameterBuffers;
 use super::passes::Passes;
-use super::sums::GradientSums;
 use super::totals::Totals;
 use super::view_buffers::ViewBuffers;
 use crate::renderer::memory::with_room;
@@ -16,16 +15,15 @@ use wgpu::BufferUsages;
 /// Buffers of the passes after the picture, and the sums over views.
 #[derive(Debug)]
 pub(super) struct Backward {
-    sums: GradientSums,
     totals: wgpu::Buffer,
     view: Option<ViewBuffers>,
 }
 
 impl Backward {
     /// Creates the sums over views, which are 0.
-    pub(super) fn new(headless: &Headless, sums: GradientSums) -> Self {
+    pub(super) fn new(headless: &Headless) -> Self {
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
-        Self { sums, totals: headless.allocator().buffer("gs4d totals", 16, usage), view: None }
+        Self { totals: headless.allocator().buffer("gs4d totals", 16, usage), view: None }
     }
 
     /// Returns the buffers for the frame that was recorded last, which has this size; `None` before the first frame. Creates them only if
@@ -39,7 +37,7 @@ impl Backward {
     ) -> Result<Option<&ViewBuffers>, GpuError> {
         let Some(frame) = headless.finished() else { return Ok(self.view.as_ref()) };
         if !self.view.as_ref().is_some_and(|made| made.fits(&frame, size)) {
-            let create = || ViewBuffers::new(headless, passes, parameters, &self.totals, self.sums, &frame, size);
+            let create = || ViewBuffers::new(headless, passes, parameters, &self.totals, &frame, size);
             self.view = Some(with_room(&headless.context().device, ViewBuffers::bytes(size), create)??);
         }
         Ok(self.view.as_ref())

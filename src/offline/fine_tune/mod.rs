@@ -5,7 +5,7 @@
 //!
 //! The best step is chosen on validation views, which are not trained on; without validation views, the last step is kept. The loss is `0.9 L1 + 0.1 (1 − SSIM)` unless set otherwise, with further [`Terms`]
 //! if these have weights, the optimizer Adam (section 6 of the 4DGS model). Views, backgrounds and rates of a step follow from its number
-//! alone, so that a run which is resumed ends as one which was not interrupted, but for rounding if sums are [atomic](GradientSums::Atomic).
+//! alone, so that a run which is resumed ends as one which was not interrupted.
 //! Training from pictures alone (`offline::train`) is the same with [`Growth`]: Gaussians that fade move to others, or, for comparison with the
 //! original, Gaussians are cloned, split and removed within a fixed capacity.
 //!
@@ -47,7 +47,6 @@ pub(crate) mod sample;
 mod schedule;
 mod settings;
 pub(crate) mod state;
-mod sums;
 mod targets;
 pub(crate) mod terms;
 mod tied;
@@ -70,7 +69,6 @@ pub(crate) use room::require_room;
 pub(crate) use sample::{GpuImage, Sample};
 pub use schedule::{Behind, Rates};
 pub use settings::FineTuneSettings;
-pub use sums::GradientSums;
 pub use targets::{ImageRoom, TrainingImages};
 pub use terms::Terms;
 pub(crate) use trainer::Trainer;

@@ -20,15 +20,6 @@ pub(super) fn across_and_down(groups: u32) -> [u32; 2] {
     [across, groups.div_ceil(across.max(1))]
 }
 
-/// Which values a step of `adam` updates.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Extent {
-    /// Whether Gaussians are skipped that no view has shown.
-    pub sparse: bool,
-    /// Number of values of each Gaussian that are updated, from the first; `None`: all.
-    pub values: Option<u32>,
-}
-
 /// One kind of parameters on the GPU, with what the optimizer knows of each.
 #[derive(Debug)]
 pub(super) struct Optimized {
@@ -37,41 +28,27 @@ pub(super) struct Optimized {
     moments: [wgpu::Buffer; 2],
     settings: wgpu::Buffer,
     group: wgpu::BindGroup,
-    /// Index of the first Gaussian among all.
-    first: u32,
     /// Number of Gaussians or entries, and four-vectors of each.
     pub count: u32,
     pub stride: u32,
 }
 
 impl Optimized {
-    /// Creates gradients and moments, which are 0, beside the values. `notes` say which Gaussians were seen.
-    pub(super) fn new(
-        headless: &Headless,
-        passes: &Passes,
-        notes: &wgpu::Buffer,
-        values: wgpu::Buffer,
-        count: u32,
-        stride: u32,
-    ) -> Self {
+    /// Creates gradients and moments, which are 0, beside the values.
+    pub(super) fn new(headless: &Headless, passes: &Passes, values: wgpu::Buffer, count: u32, stride: u32) -> Self {
         let allocator = headless.allocator();
         let size = u64::from(count) * u64::from(stride) * 16;
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
         let gradients = allocator.buffer("gs4d gradients", size, usage);
         let moments = [(); 2].map(|()| allocator.buffer("gs4d moments", size, usage));
         let settings = allocator.buffer("gs4d adam", size_of::<AdamUniforms>() as u64, BufferUsages::UNIFORM);
-        let buffers = [&settings, &values, &gradients, &moments[0], &moments[1], notes];
+        let buffers = [&settings, &values, &gradients, &moments[0], &moments[1]];
         let resources = buffers.map(wgpu::Buffer::as_entire_binding);
         let group = allocator.bind_group("gs4d adam", &passes.adam_group, &resources);
-        Self { values, gradients, moments, settings, group, first: 0, count, stride }
+        Self { values, gradients, moments, settings, group, count, stride }
     }
 
-    /// Returns the parameters as those of a part of the Gaussians, the first of which has this index.
-    pub(super) fn beginning_at(self, first: u32) -> Self {
-        Self { first, ..self }
-    }
-
-    /// Records step number `step`, counted from 1.
+    /// Records step number `step`, counted from 1, which updates so many values of each Gaussian, from the first; `None`: all.
     pub(super) fn record_step(
         &self,
         queue: &wgpu::Queue,
@@ -79,18 +56,17 @@ impl Optimized {
         passes: &Passes,
         rates: [[f32; 4]; 5],
         step: usize,
-        extent: Extent,
+        values: Option<u32>,
     ) {
-        let Self { first, count, stride, .. } = *self;
+        let Self { count, stride, .. } = *self;
         let settings = AdamUniforms {
             rates,
             correction: correction(step),
             count,
             stride,
-            sparse: extent.sparse.into(),
-            values: extent.values.unwrap_or(4 * stride),
-            first,
+            values: values.unwrap_or(4 * stride),
             padding: 0,
+            end: [0; 2],
         };
         queue.write_buffer(&self.settings, 0, bytemuck::bytes_of(&settings));
         pass.set_pipeline(&passes.adam);

@@ -94,13 +94,12 @@ impl ParameterBuffers {
         let raw = allocator.buffer("gs4d trained", size_of_val(records) as u64, storage);
         queue.write_buffer(&raw, 0, bytemuck::cast_slice(records));
         let notes = allocator.buffer("gs4d notes", FAULT_BYTES + 8 * u64::from(total), storage);
-        let geometry = Optimized::new(headless, passes, &notes, raw, total, 5);
+        let geometry = Optimized::new(headless, passes, raw, total, 5);
         let mut first = 0;
         let part = |(count, [gaussians, lifespans, harmonics]): (u32, [&wgpu::Buffer; 3])| {
             let settings = TrainedScene { count, model: number_of(model), prefilter_var, view: 0, first, total };
             first += count;
-            let color = Optimized::new(headless, passes, &notes, harmonics.clone(), count, stride);
-            let color = color.beginning_at(settings.first);
+            let color = Optimized::new(headless, passes, harmonics.clone(), count, stride);
             let uniform = BufferUsages::UNIFORM;
             let scene_settings = allocator.buffer("gs4d trained scene", size_of::<TrainedScene>() as u64, uniform);
             let whole = wgpu::Buffer::as_entire_binding;

@@ -59,7 +59,7 @@ impl Passes {
         let splats_group =
             group("gs4d splats", &[Uniform(size_of::<InstanceUniforms>()), SCENE, Read, Read, Read, Read]);
         let parameters_group = group("gs4d parameters", &[Read, Read, Write, Write, Write]);
-        let adam_group = group("gs4d adam", &[Uniform(size_of::<AdamUniforms>()), Write, Write, Write, Write, Read]);
+        let adam_group = group("gs4d adam", &[Uniform(size_of::<AdamUniforms>()), Write, Write, Write, Write]);
         let tied = [Uniform(size_of::<TiedColors>()), Read, Read, Read, Read, Write, Read, Write];
         let tied_group = group("gs4d tied colors", &tied);
         let slice = SHADERS.module(device, "slice", &[], checks)?;

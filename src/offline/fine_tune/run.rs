@@ -77,9 +77,8 @@ impl<'a> Run<'a> {
         if let Some(Cloning { capacity, .. }) = cloning {
             scene = with_places(&scene, capacity);
         }
-        let mut trainer = Trainer::with_sums(headless, scene, settings.mode, settings.sums)?;
+        let mut trainer = Trainer::new(headless, scene, settings.mode)?;
         trainer.set_terms(settings.terms)?;
-        trainer.set_sparse(settings.sparse);
         if settings.exposure {
             trainer.set_exposure(&images.cameras())?;
         }

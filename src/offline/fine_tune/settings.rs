@@ -4,7 +4,6 @@
 
 use super::growth::Growth;
 use super::schedule::{Behind, Rates};
-use super::sums::GradientSums;
 use super::terms::Terms;
 use crate::gaussian::GradientMode;
 use crate::offline::quantize::Quality;
@@ -24,8 +23,6 @@ pub struct FineTuneSettings {
     pub similarity_share: f64,
     /// Weights of further terms of the loss. Default: 0.
     pub terms: Terms,
-    /// Whether a step leaves Gaussians as they are that none of its views shows. Default: `false`.
-    pub sparse: bool,
     /// Whether a correction of color is trained for each camera: an exposure, which the scene does not have. Default: `false`.
     pub exposure: bool,
     /// What is behind images that do not cover all of their pixels.
@@ -40,8 +37,6 @@ pub struct FineTuneSettings {
     pub refresh_filter: usize,
     /// Whether gradients are those of the original, with its deviations.
     pub mode: GradientMode,
-    /// How gradients are summed. Default: in a fixed order.
-    pub sums: GradientSums,
     /// Relocation, noise and schedules of training from pictures alone; `None`, the default, fine-tunes.
     pub growth: Option<Growth>,
     /// How the result is compressed, and the number of further steps in which the codebooks of color are trained; `None` leaves the scene in
@@ -67,7 +62,6 @@ impl Default for FineTuneSettings {
             last_rate: 0.2,
             similarity_share: 0.1,
             terms: Terms::default(),
-            sparse: false,
             exposure: false,
             behind: Behind::default(),
             seed: 0,
@@ -75,7 +69,6 @@ impl Default for FineTuneSettings {
             patience: None,
             refresh_filter: 1000,
             mode: GradientMode::default(),
-            sums: GradientSums::default(),
             growth: None,
             compress: None,
             rounding: false,

@@ -80,7 +80,7 @@ impl Tied {
         let firsts = filled("gs4d first members", bytemuck::cast_slice(&firsts), storage);
         let members = filled("gs4d members", bytemuck::cast_slice(&members.concat()), storage);
         let values = filled("gs4d entries", bytemuck::cast_slice(&values), storage);
-        let entries = Optimized::new(headless, passes, &parameters.notes, values, total as u32, stride);
+        let entries = Optimized::new(headless, passes, values, total as u32, stride);
         let Optimized { values, gradients, .. } = &entries;
         let buffers = [&settings, &codes, &firsts, &members, values, &color.values, &color.gradients, gradients];
         let group =

@@ -3,7 +3,7 @@
 //! In: the map of a capture, the gradients of the pixels of finished frames. Out: [`TrainedEnvironment`]: commands of the passes `scatter` and
 //! `gather` of `environment_backward`, of `adam`, and of the copy into the map that is drawn.
 
-use super::optimized::{Extent, Optimized};
+use super::optimized::Optimized;
 use super::passes::Passes;
 use crate::offline::shaders::SHADERS;
 use crate::renderer::bind::{Bind, group_layout, pipeline};
@@ -30,14 +30,13 @@ pub(super) struct TrainedEnvironment {
 }
 
 impl TrainedEnvironment {
-    /// Compiles the passes. `map` holds these texels; `notes` are those of the Gaussians.
+    /// Compiles the passes. `map` holds these texels.
     ///
     /// # Errors
     /// A shader that does not compile.
     pub(super) fn new(
         headless: &Headless,
         passes: &Passes,
-        notes: &wgpu::Buffer,
         map: &wgpu::Buffer,
         texels: &[f32],
     ) -> Result<Self, GpuError> {
@@ -52,7 +51,7 @@ impl TrainedEnvironment {
         let own = allocator.buffer("gs4d trained environment", 16 * vectors as u64, usage);
         context.queue.write_buffer(&own, 0, bytemuck::cast_slice(texels));
         let sums = allocator.buffer("gs4d sums of the environment", 4 * texels.len() as u64, BufferUsages::STORAGE);
-        let values = Optimized::new(headless, passes, notes, own, vectors as u32, 1);
+        let values = Optimized::new(headless, passes, own, vectors as u32, 1);
         Ok(Self { values, map: map.clone(), sums, layout, scatter, gather })
     }
 
@@ -92,8 +91,7 @@ impl TrainedEnvironment {
         rate: f32,
         step: usize,
     ) {
-        let all = Extent { sparse: false, values: None };
-        self.values.record_step(queue, pass, passes, [[rate; 4]; 5], step, all);
+        self.values.record_step(queue, pass, passes, [[rate; 4]; 5], step, None);
     }
 
     /// Records that the map which is drawn gets the values.

@@ -4,7 +4,7 @@
 //! `adam`. Exposures are part of the state of training, not of the scene.
 
 use super::exposure::{Exposure, IDENTITY, PULL};
-use super::optimized::{Extent, Optimized};
+use super::optimized::Optimized;
 use super::passes::Passes;
 use super::sample::{GpuImage, Sample};
 use super::view_buffers::ViewBuffers;
@@ -54,17 +54,11 @@ pub(super) struct Correction<'a> {
 }
 
 impl TrainedExposure {
-    /// Compiles the passes. All exposures are the identity; `cameras` has the camera of each view, by the number of the view; `notes` are those
-    /// of the Gaussians.
+    /// Compiles the passes. All exposures are the identity; `cameras` has the camera of each view, by the number of the view.
     ///
     /// # Errors
     /// A shader that does not compile.
-    pub(super) fn new(
-        headless: &Headless,
-        passes: &Passes,
-        notes: &wgpu::Buffer,
-        cameras: &[u32],
-    ) -> Result<Self, GpuError> {
+    pub(super) fn new(headless: &Headless, passes: &Passes, cameras: &[u32]) -> Result<Self, GpuError> {
         use Bind::{Read, Target, Texture, Uniform, Write};
         let (allocator, context) = (headless.allocator(), headless.context());
         let size = size_of::<ExposureUniforms>();
@@ -81,7 +75,7 @@ impl TrainedExposure {
         context.queue.write_buffer(&own, 0, bytemuck::cast_slice(&vec![IDENTITY; count as usize]));
         let every = allocator.bind_group("gs4d exposures", &of_every, &[own.as_entire_binding()]);
         Ok(Self {
-            values: Optimized::new(headless, passes, notes, own, count, ROWS),
+            values: Optimized::new(headless, passes, own, count, ROWS),
             cameras: cameras.to_vec(),
             settings: allocator.buffer("gs4d exposure settings", size as u64, BufferUsages::UNIFORM),
             layout,
@@ -164,8 +158,7 @@ impl TrainedExposure {
         rate: f32,
         step: usize,
     ) {
-        let all = Extent { sparse: false, values: None };
-        self.values.record_step(queue, pass, passes, [[rate; 4]; 5], step, all);
+        self.values.record_step(queue, pass, passes, [[rate; 4]; 5], step, None);
         pass.set_pipeline(&self.center);
         pass.set_bind_group(1, &self.every, &[]);
         pass.dispatch_workgroups(1, 1, 1);

@@ -1,7 +1,7 @@
 //! Training on the GPU, with the renderer's own passes.
 //!
 //! In: a scene in the trained form, views with their images. Out: the scene after some steps, its gradients, its state. Nothing is added without order, so that every
-//! run gives the same result, unless [sums](GradientSums) are atomic.
+//! run gives the same result.
 //!
 //! | pass | reads | writes |
 //! |---|---|---|
@@ -14,7 +14,7 @@
 //! | `environment_backward` | gradients of pixels, transmittance | gradients of the environment map, if the scene has one |
 //! | `project_backward` | gradients of pairs, parameters | gradients of raw parameters, added up over a batch; which Gaussians were seen |
 //! | `regularize` | parameters, their slice, neighbors | gradients of raw parameters, if there are [`Terms`] of Gaussians alone |
-//! | `adam` | gradients, moments | parameters; of Gaussians that were seen only, if steps are [sparse](Trainer::set_sparse) |
+//! | `adam` | gradients, moments | parameters |
 //! | `dropout` | the records of `slice` | the same, some without opacity, if Gaussians are [dropped](Trainer::drop_out) |
 //! | `noise` | raw parameters | the same with means moved at random and no too small temporal scale, if the scene [grows](Trainer::set_growing) |
 //! | `statistics` | views of a Gaussian, its gradients on the screen | sums over steps, if the scene [grows as the original](Trainer::set_cloning) |
@@ -26,7 +26,7 @@ use super::cloner::{Cloner, CloningStep, reset, taken};
 use super::cloning::Densified;
 use super::exposure::Exposure;
 use super::grower::Grower;
-use super::optimized::{Extent, Optimized};
+use super::optimized::Optimized;
 use super::parameters::ParameterBuffers;
 use super::passes::Passes;
 use super::records::{records, set_harmonics, set_parameters};
@@ -36,7 +36,6 @@ use super::rounding::{Rounder, changes};
 use super::sample::{GpuImage, Sample};
 use super::schedule::Rates;
 use super::state::TrainerState;
-use super::sums::GradientSums;
 use super::terms::Terms;
 use super::tied::Tied;
 use super::totals::{Faults, Totals};
@@ -92,7 +91,6 @@ pub struct Trainer<'a> {
     rounder: Option<Rounder>,
     grower: Option<Grower>,
     cloner: Option<Cloner>,
-    sparse: bool,
     in_flight: VecDeque<wgpu::SubmissionIndex>,
 }
 
@@ -101,21 +99,7 @@ impl<'a> Trainer<'a> {
     ///
     /// # Errors
     /// A Gaussian that cannot be drawn, a scene that does not fit one binding of the device, a limit that is too low.
-    pub fn new(headless: &'a mut Headless, scene: GaussianScene, mode: GradientMode) -> Result<Self, TrainerError> {
-        Self::with_sums(headless, scene, mode, GradientSums::default())
-    }
-
-    /// As [`new`](Self::new), with gradients summed in this way.
-    ///
-    /// # Errors
-    /// As [`new`](Self::new), and a device that cannot sum in this way.
-    pub fn with_sums(
-        headless: &'a mut Headless,
-        mut scene: GaussianScene,
-        mode: GradientMode,
-        sums: GradientSums,
-    ) -> Result<Self, TrainerError> {
-        sums.check(headless)?;
+    pub fn new(headless: &'a mut Headless, mut scene: GaussianScene, mode: GradientMode) -> Result<Self, TrainerError> {
         // They are of the Gaussians as they were.
         scene.levels.clear();
         let SceneForm::Trained(trained) = &scene.form else { return Err(TrainerError::NotTrained) };
@@ -129,7 +113,7 @@ impl<'a> Trainer<'a> {
             GradientMode::Compat => COMPAT,
         };
         let filter = if scene.trained_with.mip_filter { MIP_FILTER } else { &[] };
-        let definitions = [definitions, sums.definitions(), filter].concat();
+        let definitions = [definitions, filter].concat();
         let passes = Passes::new(headless, &definitions, ShaderChecks::Off)?;
         let degrees = runtime.form.color_degrees();
         let stride = stride(degrees.degree, degrees.degree_t);
@@ -144,10 +128,10 @@ impl<'a> Trainer<'a> {
             let parameters = ParameterBuffers::new(headless, &passes, settings, &records, stride, capture.writable());
             Ok::<_, GpuError>((capture, parameters))
         })??;
-        let backward = Backward::new(headless, sums);
+        let backward = Backward::new(headless);
         let environment = match (&scene.environment, capture.environment()) {
             (Some(Environment { texels, .. }), Some(map)) => {
-                Some(TrainedEnvironment::new(headless, &passes, &parameters.notes, map, texels)?)
+                Some(TrainedEnvironment::new(headless, &passes, map, texels)?)
             }
             _ => None,
         };
@@ -166,7 +150,6 @@ impl<'a> Trainer<'a> {
             rounder: None,
             grower: None,
             cloner: None,
-            sparse: false,
             in_flight: VecDeque::new(),
         };
         trainer.slice();
@@ -236,7 +219,7 @@ impl<'a> Trainer<'a> {
     /// # Errors
     /// A shader that does not compile.
     pub fn set_exposure(&mut self, cameras: &[u32]) -> Result<(), GpuError> {
-        self.exposure = Some(TrainedExposure::new(self.headless, &self.passes, &self.parameters.notes, cameras)?);
+        self.exposure = Some(TrainedExposure::new(self.headless, &self.passes, cameras)?);
         Ok(())
     }
 
@@ -340,12 +323,6 @@ impl<'a> Trainer<'a> {
         regularizer.search(self.headless, &self.parameters, step)?;
         submit(self.headless, "gs4d terms", |pass| regularizer.record(pass, &self.parameters));
         Ok(())
-    }
-
-    /// Sets whether a step leaves Gaussians as they are, with their moments, that no view of its batch shows. Default: `false`. Entries of
-    /// codebooks are stepped in any case.
-    pub fn set_sparse(&mut self, sparse: bool) {
-        self.sparse = sparse;
     }
 
     /// Compiles the passes of training from pictures alone, for [`step_growing`](Self::step_growing) and [`relocate`](Self::relocate).
@@ -452,22 +429,21 @@ impl<'a> Trainer<'a> {
         step: usize,
         growth: Option<StepGrowth>,
     ) -> Result<(), GpuError> {
-        let Self { headless, passes, parameters, environment, exposure, tied, sparse, .. } = &*self;
+        let Self { headless, passes, parameters, environment, exposure, tied, .. } = &*self;
         let ParameterBuffers { geometry, parts, .. } = parameters;
         let colors = rates.of_harmonics(factor);
         let spatial_lr_scale = self.scene.trained_with.spatial_lr_scale;
         let unit = self.scene.trained_with.unit_length();
         let geometry_rates = rates.of_parameters(spatial_lr_scale, unit, factor);
-        let all = Extent { sparse: *sparse, values: None };
-        let of_color = Extent { values: growth.map(|growth| growth.color_values), ..all };
-        let mut rated = vec![(geometry, geometry_rates, all)];
+        let of_color = growth.map(|growth| growth.color_values);
+        let mut rated = vec![(geometry, geometry_rates, None)];
         let of_parts = parts.iter().map(|part| &part.color);
         match tied {
             // The first coefficient of each Gaussian is its own; entries are of many.
             Some(tied) => {
                 let own = Rates { harmonics: 0.0, ..*rates }.of_harmonics(factor);
-                rated.extend(of_parts.map(|color| (color, own, all)));
-                rated.push((&tied.entries, [colors[1]; 5], Extent { sparse: false, ..all }));
+                rated.extend(of_parts.map(|color| (color, own, None)));
+                rated.push((&tied.entries, [colors[1]; 5], None));
             }
             None => rated.extend(of_parts.map(|color| (color, colors, of_color))),
         }
@@ -478,8 +454,8 @@ impl<'a> Trainer<'a> {
             if let Some(tied) = tied {
                 tied.record_collect(&mut pass, passes);
             }
-            for (optimized, rates, extent) in rated {
-                optimized.record_step(queue, &mut pass, passes, rates, step, extent);
+            for (optimized, rates, values) in rated {
+                optimized.record_step(queue, &mut pass, passes, rates, step, values);
             }
             if let Some(environment) = environment {
                 environment.record_step(queue, &mut pass, passes, (rates.environment * factor) as f32, step);

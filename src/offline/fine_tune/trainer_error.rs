@@ -31,15 +31,6 @@ pub enum TrainerError {
         "only native 4D Gaussians, with both rotations, can be trained from pictures alone: fine-tune others with gs4d finetune"
     )]
     Model,
-    /// The device has no float atomics.
-    #[error(
-        "the adapter `{adapter}` cannot add floating-point numbers atomically: sum gradients with --sums deterministic, or choose another \
-         one with --adapter"
-    )]
-    NoAtomics {
-        /// Name of the adapter.
-        adapter: String,
-    },
     /// There is nothing to train.
     #[error("there are no Gaussians to fine-tune")]
     Empty,

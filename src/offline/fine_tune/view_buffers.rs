@@ -6,7 +6,6 @@ use super::optimized::across_and_down;
 use super::parameters::ParameterBuffers;
 use super::passes::Passes;
 use super::sample::GpuImage;
-use super::sums::GradientSums;
 use crate::offline::layout::LossUniforms;
 use crate::renderer::layout::{INSTANCE_STRIDE, InstanceUniforms};
 use crate::renderer::memory::binding_limit;
@@ -15,7 +14,7 @@ use crate::view::tiles;
 use glam::UVec2;
 use wgpu::BufferUsages;
 
-/// Values that `blend_backward` writes for each pair or splat.
+/// Values that `blend_backward` writes for each pair.
 const SUMS: u64 = 10;
 
 /// Bytes of the slopes of similarity of a pixel, the most of all buffers by pixels.
@@ -41,15 +40,12 @@ pub(super) struct ViewBuffers {
     splats: wgpu::Buffer,
     color: wgpu::TextureView,
     size: UVec2,
-    summed: GradientSums,
     pub loss_settings: wgpu::Buffer,
     slopes: wgpu::Buffer,
     pub pixel_gradients: wgpu::Buffer,
     tile_sums: wgpu::Buffer,
     totals: wgpu::Buffer,
     pub depth_gradients: wgpu::Buffer,
-    /// Those of pairs, or of splats if sums are atomic.
-    gradients: wgpu::Buffer,
     loss: wgpu::BindGroup,
     blended: wgpu::BindGroup,
     sums: wgpu::BindGroup,
@@ -69,19 +65,14 @@ impl ViewBuffers {
         passes: &Passes,
         parameters: &ParameterBuffers,
         totals: &wgpu::Buffer,
-        summed: GradientSums,
         frame: &FinishedFrame<'_>,
         size: UVec2,
     ) -> Result<Self, GpuError> {
         let allocator = headless.allocator();
         let limit = binding_limit(&allocator.device.limits());
-        let (what, count) = match summed {
-            GradientSums::Deterministic => ("the gradients of pairs", frame.pairs),
-            GradientSums::Atomic => ("the gradients of splats", frame.slots),
-        };
-        let needed = u64::from(count) * SUMS * 4;
+        let needed = u64::from(frame.pairs) * SUMS * 4;
         if needed > limit {
-            return Err(GpuError::TooLarge { what, needed, limit });
+            return Err(GpuError::TooLarge { what: "the gradients of pairs", needed, limit });
         }
         require_bindings(headless, size)?;
         let pixels = size.as_u64vec2().element_product();
@@ -95,7 +86,7 @@ impl ViewBuffers {
         let depth_gradients = storage("gs4d gradients of depths", pixels * 4);
         let tile_sums = storage("gs4d sums of tiles", tiles * 16);
         let first_pairs = storage("gs4d first pairs", u64::from(frame.slots) * 4);
-        let gradients = storage("gs4d gradients of splats", needed);
+        let gradients = storage("gs4d gradients of pairs", needed);
         let color = wgpu::BindingResource::TextureView(frame.color);
         let whole = wgpu::Buffer::as_entire_binding;
         let buffers = frame.buffers;
@@ -126,7 +117,6 @@ impl ViewBuffers {
             splats: buffers.splats.clone(),
             color: frame.color.clone(),
             size,
-            summed,
             loss: bind_loss(headless, passes, of_loss, frame.color),
             blended: allocator.bind_group("gs4d blended", &passes.blended_group, &blended),
             sums: allocator.bind_group("gs4d sums", &passes.sums_group, &sums),
@@ -137,7 +127,6 @@ impl ViewBuffers {
             tile_sums,
             totals: totals.clone(),
             depth_gradients,
-            gradients,
         })
     }
 
@@ -193,16 +182,11 @@ impl ViewBuffers {
     ) {
         let Some(frame) = headless.finished() else { return };
         let tiles = tiles(self.size);
-        if self.summed == GradientSums::Atomic {
-            encoder.clear_buffer(&self.gradients, 0, None);
-        }
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
         pass.set_bind_group(0, &self.blended, &[]);
         pass.set_bind_group(1, &self.sums, &[]);
-        if self.summed == GradientSums::Deterministic {
-            pass.set_pipeline(&passes.place);
-            pass.dispatch_workgroups(frame.slots.div_ceil(256), 1, 1);
-        }
+        pass.set_pipeline(&passes.place);
+        pass.dispatch_workgroups(frame.slots.div_ceil(256), 1, 1);
         pass.set_pipeline(&passes.pairs);
         pass.dispatch_workgroups(tiles.x, tiles.y, 1);
         pass.set_pipeline(&passes.project_backward);

@@ -5,7 +5,6 @@
 use super::bake::Bake;
 use super::measure::{MEASURES, Measure};
 use super::outliers::{Outlier, Usual};
-use crate::offline::names;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
@@ -89,7 +88,7 @@ impl FleetReport {
         let mut text = row(&heads.map(str::to_owned).collect::<Vec<_>>());
         for bake in &self.bakes {
             let form = bake.figures.as_ref().map_or("", |figures| figures.form);
-            let mut cells = vec![names::shown(&bake.package.display().to_string()), form.to_owned()];
+            let mut cells = vec![bake.package.display().to_string(), form.to_owned()];
             cells.extend(
                 MEASURES.iter().map(|measure| measure.of(bake).map_or_else(String::new, |value| measure.shown(value))),
             );

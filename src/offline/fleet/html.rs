@@ -8,7 +8,6 @@ use super::fleet_report::FleetReport;
 use super::measure::{MEASURES, Measure};
 use super::outliers::{FEWEST, LIMIT, Outlier};
 use super::strip::{Dot, strip};
-use crate::offline::names;
 use crate::offline::report::escape::escape;
 use std::path::{Component, Path, PathBuf};
 
@@ -57,8 +56,7 @@ impl FleetReport {
 
     /// Returns the distributions of all measures.
     fn strips(&self) -> String {
-        let shown: Vec<String> =
-            self.bakes.iter().map(|bake| names::shown(&bake.package.display().to_string())).collect();
+        let shown: Vec<String> = self.bakes.iter().map(|bake| bake.package.display().to_string()).collect();
         let card = |(measure, usual): (&Measure, &Option<_>)| {
             let bakes = self.bakes.iter().zip(&shown).enumerate();
             let dots: Vec<Dot> =
@@ -79,11 +77,7 @@ impl FleetReport {
 
     fn failures_card(&self) -> String {
         let line = |(bake, failure): (&Bake, &str)| {
-            format!(
-                "<li><b>{}</b> {}</li>",
-                escape(&names::shown(&bake.package.display().to_string())),
-                escape(failure)
-            )
+            format!("<li><b>{}</b> {}</li>", escape(&bake.package.display().to_string()), escape(failure))
         };
         match self.failures().map(line).collect::<String>() {
             lines if lines.is_empty() => lines,
@@ -149,7 +143,7 @@ fn cell(measure: &Measure, value: Option<f64>, outlier: Option<&Outlier>) -> Str
 
 /// Returns the name of a package, with links to the package and to its own page.
 fn name(bake: &Bake, page: &Path) -> String {
-    let shown = escape(&names::shown(&bake.package.display().to_string()));
+    let shown = escape(&bake.package.display().to_string());
     let target = bake.page.as_ref().unwrap_or(&bake.package);
     match link(page, target) {
         Some(link) if target.exists() => format!("<a href=\"{}\">{shown}</a>", escape(&link)),
@@ -175,9 +169,7 @@ fn remarks(bake: &Bake, outliers: &[Outlier]) -> String {
 fn link(page: &Path, file: &Path) -> Option<String> {
     let folder = page.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let resolved = |path: &Path| path.canonicalize().or_else(|_| std::path::absolute(path)).ok();
-    // Copies are linked by the names of their origins.
-    let place = |path: &Path| Some(PathBuf::from(names::shown(&resolved(path)?.display().to_string())));
-    let (from, to) = (place(folder)?, place(file)?);
+    let (from, to) = (resolved(folder)?, resolved(file)?);
     let shared = from.components().zip(to.components()).take_while(|(a, b)| a == b).count();
     if shared == 0 {
         return None;

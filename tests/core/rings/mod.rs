@@ -24,7 +24,6 @@ const RINGS: &Order = &[
     ("offline", &["view", "gaussian", "scene", "codec", "reference", "renderer"]),
     ("plugin", &["view", "gaussian", "scene", "codec", "reference", "renderer"]),
     ("cli", &["view", "gaussian", "scene", "codec", "reference", "renderer", "offline"]),
-    ("storage", &["view", "gaussian", "scene", "codec", "reference", "renderer", "offline", "cli"]),
 ];
 
 /// The order inside the plugin.
