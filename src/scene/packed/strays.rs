@@ -207,8 +207,11 @@ fn shells(gaussians: &[Gaussian], near: &[u32], strays: Vec<u32>) -> Vec<Vec<u32
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::packed::order::morton_order;
     use crate::scene::random::Random;
+
+    fn morton_order(gaussians: &[Gaussian]) -> Vec<u32> {
+        set_apart(gaussians, by_code(gaussians, (0..gaussians.len() as u32).collect()))
+    }
 
     /// Returns a Gaussian of the size 0.02 √3 at a place.
     fn gaussian(mean: DVec3) -> Gaussian {
