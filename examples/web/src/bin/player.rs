@@ -227,8 +227,13 @@ impl Player {
                 // The passes are compiled here, so that the first picture does not take long.
                 let size = UVec2::new(self.configuration.width, self.configuration.height);
                 let view = view(&Mat4::IDENTITY.to_cols_array(), &[0.5, 0.5], size, 0.0, shown.kept.optics)?;
-                let prepared =
-                    self.view.prepare(device, queue, &self.renderer, &[shown.instance(view)], &shown.parameters(self.background));
+                let prepared = self.view.prepare(
+                    device,
+                    queue,
+                    &self.renderer,
+                    &[shown.instance(view)],
+                    &shown.parameters(self.background),
+                );
                 prepared.map_err(|e| e.to_string())?;
                 let about = shown.kept.about.clone();
                 self.shown = Some(*shown);
