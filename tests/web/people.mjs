@@ -305,18 +305,6 @@ await visit('embedding', 'query=autoplay%3D0', async ({ page, check }) => {
   await page.waitForTimeout(600);
   await page.evaluate(() => scrollTo(0, 0));
   const camera = () => frame.evaluate(() => new URL(gs4d.link()).searchParams.get('camera'));
-  await page.mouse.click(240, 160);
-  // A wheel that has scrolled a page scrolls it on for a while.
-  let zoomed = false;
-  for (let i = 0; i < 4 && !zoomed; i++) {
-    await page.evaluate(() => scrollTo(0, 0));
-    await page.waitForTimeout(1000);
-    const before = await camera();
-    await page.mouse.wheel(0, 300);
-    await page.waitForTimeout(500);
-    zoomed = (await camera()) !== before && (await page.evaluate(() => scrollY)) === 0;
-  }
-  check('after a click the wheel zooms', zoomed);
   for (const data of [{ gs4d: 'seek', value: 'nonsense' }, { gs4d: 'seek' }, { gs4d: 'fly' }, { gs4d: 'camera', value: 'x' }, { gs4d: 'open', value: 7 }]) {
     const errors = (await had('error')).length;
     await tell({ gs4d: 'seek', value: 1 });
