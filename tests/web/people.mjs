@@ -301,10 +301,17 @@ await visit('embedding', 'query=autoplay%3D0', async ({ page, check }) => {
   check('the player says how to zoom', (await frame.locator('#said').textContent()).includes('Ctrl'));
   await page.waitForFunction(() => scrollY > 0, null, { timeout: 3000 }).catch(() => {});
   check('the wheel scrolls the page around', (await page.evaluate(() => scrollY)) > 0);
-  // The wheel scrolls smoothly.
-  await page.waitForTimeout(600);
+  // The wheel scrolls smoothly, and the browser finds what is below the pointer some frames later.
+  await page.waitForTimeout(1500);
   await page.evaluate(() => scrollTo(0, 0));
+  await page.waitForTimeout(1000);
   const camera = () => frame.evaluate(() => new URL(gs4d.link()).searchParams.get('camera'));
+  await frame.locator('#canvas').click({ position: { x: 200, y: 70 } });
+  const before = await camera();
+  await page.mouse.wheel(0, 300);
+  await frame.waitForFunction((before) => new URL(gs4d.link()).searchParams.get('camera') !== before, before, { timeout: 5000 }).catch(() => {});
+  check('after a click the wheel zooms', (await camera()) !== before);
+  check('and does not scroll the page around', (await page.evaluate(() => scrollY)) === 0);
   for (const data of [{ gs4d: 'seek', value: 'nonsense' }, { gs4d: 'seek' }, { gs4d: 'fly' }, { gs4d: 'camera', value: 'x' }, { gs4d: 'open', value: 7 }]) {
     const errors = (await had('error')).length;
     await tell({ gs4d: 'seek', value: 1 });

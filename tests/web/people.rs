@@ -91,7 +91,7 @@ fn links_keep_what_they_were_opened_with() {
 
 #[test]
 fn the_page_around_keeps_its_wheel_and_gets_errors_and_times() {
-    check("embedding", 14);
+    check("embedding", 16);
 }
 
 #[test]
