@@ -1,8 +1,8 @@
-//! Dynamic captures in Bevy games: native 4D Gaussian Splatting, played to the pixel.
+//! Dynamic captures in Bevy games: native 4D Gaussian Splatting.
 //!
-//! In: a trained capture, as a trainer's checkpoint (`.pth`) or as a package (`.gs4d`). Out: what it looks like at any moment from
-//! any camera, in a Bevy app or in pictures on disk. A game needs the [`prelude`] and nothing else; the rest of this page is the
-//! architecture: where the data goes, and which module may use which.
+//! In: a trained capture, as a trainer's checkpoint (`.pth`) or as a package (`.gs4d`). Out: its picture at any time
+//! from any camera, in a Bevy app or in files. A game needs the [`prelude`] and nothing else; the rest of this page is
+//! the architecture: the data paths, and which module may use which.
 //!
 //! # From a file to the GPU: once for each capture
 //!
@@ -10,7 +10,7 @@
 //!  chkpnt30000.pth      capture.gs4d ◀────────┐
 //!         │                   │               │
 //!         ▼                   ▼               │
-//!  codec::checkpoint    codec::package ───────┤ offline::save
+//!  codec::checkpoint    codec::package ───────┤ offline::work::save
 //!         └─────────┬─────────┘               │
 //!                   ▼                         │
 //!         scene::GaussianScene ───────────────┘
@@ -22,16 +22,18 @@
 //!         renderer::GpuCapture        renderer::GpuCapture
 //! ```
 //!
-//! 1. [`codec`] reads a file into a scene, or refuses it with an error that names what is wrong: [`codec::checkpoint`] through a
-//!    restricted unpickler, [`codec::package`] with a checksum on every byte, files of other makes (PLY, SPZ, SOG, glTF and so on) through
-//!    `codec::import`, which states what a scene does not show of them. [`codec::load`] tells the formats apart by their contents;
-//!    [`offline::save()`] writes a file whole or not at all, and `codec::export` writes for other programs.
-//! 2. [`scene`] is what a capture is: its Gaussians and their color in the trained, the sliced or the packed form, an environment map,
-//!    a temporal filter, levels of detail, the switches it was trained with, and how it is meant to be played.
-//! 3. [`gaussian`] is the maths. [`Parameters::slice`](gaussian::Parameters::slice) makes the runtime form, once: a 3D Gaussian in
-//!    straight-line motion under an opacity envelope ([`Gaussian`](gaussian::Gaussian), 64 bytes, the layout of the GPU record too).
-//! 4. [`renderer::GpuCapture`] holds that form, or the packed one, in buffers. In Bevy, [`asset`] loads the file in the background and
-//!    [`render`] uploads it.
+//! 1. [`codec`] reads a file into a scene, or returns an error that names the fault: [`codec::checkpoint`] through a
+//!    restricted unpickler, [`codec::package`] with checksums over every byte, files of other programs (PLY, SPZ, SOG,
+//!    glTF and so on) through `codec::import`, which lists what is lost. [`codec::load`] recognizes the format by the
+//!    contents of the file; [`offline::work::save()`] writes a file whole or not at all, and `codec::export` writes for
+//!    other programs.
+//! 2. [`scene`] is a capture in memory: Gaussians and their colors in the trained, the sliced or the packed form, an
+//!    environment map, a temporal filter, levels of detail, the settings of the training, and hints for playback.
+//! 3. [`gaussian`] is the math. [`Parameters::slice`](gaussian::Parameters::slice) makes the runtime form, once: a 3D
+//!    Gaussian in straight-line motion under an opacity envelope ([`Gaussian`](gaussian::Gaussian), 64 bytes, as in the
+//!    GPU buffer).
+//! 4. [`renderer::GpuCapture`] holds that form, or the packed one, in buffers. In Bevy, [`asset`] loads the file in the
+//!    background and [`render`] uploads it.
 //!
 //! # From the GPU to pixels: once for each frame and camera
 //!
@@ -64,25 +66,28 @@
 //!  render: composite into the camera's target              renderer::Headless: view::Frame
 //! ```
 //!
-//! 1. [`playback`] advances each entity's time, or a timeline or a shared clock does; a [`View`](view::View) is one camera at one time.
-//!    In Bevy [`render`] makes it from cameras and transforms, elsewhere a [`Camera`](view::Camera) does.
-//! 2. [`renderer`] draws views with plain wgpu, on whatever device it is given; it knows nothing of Bevy. `activate` lists the Gaussians
-//!    that the temporal filter leaves, only when a capture enters another segment of time. All captures in a view share one compute
-//!    pass, so that they interleave by depth. Its size is decided on the GPU: nothing is read back inside a frame.
-//! 3. Inside `blend` and `blend_blocks` the depth of opaque meshes cuts the splats, pixel by pixel; before `project_bin`, `find_surfaces` finds the
-//!    farthest mesh of each tile, behind which splats are left out, and of the picture, behind which Gaussians are not projected. The composite lays the result over what the
-//!    camera has drawn so far; it, `write_depth` and `write_motion` are the passes in Bevy's pipeline cache.
-//! 4. [`renderer::Headless`] returns the result as a [`Frame`](view::Frame) instead. The `gs4d` command and the tests use it.
+//! 1. [`playback`] advances each entity's time, or a timeline or a shared clock does; a [`View`](view::View) is one
+//!    camera at one time. In Bevy [`render`] makes it from cameras and transforms, elsewhere [`view::Camera`] does.
+//! 2. [`renderer`] draws views with wgpu, on any device, without Bevy. `activate` lists the Gaussians that the temporal
+//!    filter leaves, only when a capture enters another segment of time. All captures in a view share one compute pass,
+//!    so that they interleave by depth. The GPU sizes its dispatches: nothing is read back inside a frame.
+//! 3. Inside `blend` and `blend_blocks` the depth of opaque meshes cuts the splats, pixel by pixel; before
+//!    `project_bin`, `find_surfaces` finds the farthest mesh of each tile, behind which splats are left out, and of the
+//!    picture, behind which Gaussians are not projected. The composite draws the result over the camera's picture so
+//!    far; `composite`, `write_depth` and `write_motion` are the passes in Bevy's pipeline cache.
+//! 4. [`renderer::Headless`] returns the result as a [`Frame`](view::Frame) instead. The `gs4d` command and the tests
+//!    use it.
 //!
 //! Each pass has one name everywhere: its shader (`shaders/tile_bins/project_bin.wgsl`), its pipeline and its recording
-//! (`src/renderer/tile_bins/`), its timestamp span (`sort` has two: by depth, by tile), its tests. The function in [`mod@reference`] is that of the
-//! global sort, whose pictures tile bins draw too. Rules that several passes share are a file each, in `shaders/shared/` and in
-//! [`gaussian`]: which tiles a splat covers (`gaussian::overlap`), what it does to a pixel (`gaussian::alpha`).
+//! (`src/renderer/tile_bins/`), its timestamp span (`sort` has two: by depth, by tile), its tests. The functions in
+//! [`mod@reference`] are those of the global sort; tile bins draw the same pictures. Each rule that several passes use
+//! has a file in `shaders/shared/` and one in [`gaussian`]: the tiles that a splat covers (`gaussian::overlap`), its
+//! alpha at a pixel (`gaussian::alpha`).
 //!
 //! # The rings
 //!
-//! The modules lie around each other like rings. Each may use those inside it and none outside; a test reads the paths in the source
-//! and fails on one that points outwards.
+//! The modules form rings. Each may use those inside it and none outside; a test reads the paths in the source and
+//! fails on a path that points outwards.
 //!
 //! ```text
 //!                          ┌──▶ codec ───────┐                ┌──▶ offline ──▶ cli
@@ -90,10 +95,10 @@
 //!                          └──▶ reference ───┘                └──▶ plugin
 //! ```
 //!
-//! | ring | what it knows | feature |
+//! | ring | subject | feature |
 //! |---|---|---|
-//! | [`view`] | cameras, moments, how things are shown, pictures: glam, and no Gaussian | |
-//! | [`gaussian`] | one native 4D Gaussian: its slice, its projection, its color, the rules of overlap and alpha | |
+//! | [`view`] | cameras, times, appearance, pictures | |
+//! | [`gaussian`] | one native 4D Gaussian: slice, projection, color, the rules of overlap and alpha | |
 //! | [`scene`] | a capture in memory: its forms, bounds, filter, origin; picking | |
 //! | [`codec`] | files | |
 //! | [`mod@reference`] | the renderer's passes on the CPU, as plain functions over slices | |
@@ -102,33 +107,35 @@
 //! | `plugin` | Bevy | `bevy` |
 //! | [`cli`] | the `gs4d` command: options and printing over [`offline`] | `cli` |
 //!
-//! The last four are the gates of the crate: each is behind one feature, and nothing inside them is. It is not quite a list:
+//! Each of the last four rings is a feature of the crate. [`codec`] and [`mod@reference`] are independent of each
+//! other, as are `plugin` and [`offline`]: a game compiles neither datasets nor metrics. Code that two rings need is in
+//! a ring inside both.
 //!
-//! * [`codec`] and [`mod@reference`] lie side by side: one reads files, the other draws, and neither needs the other.
-//! * `plugin` lies beside [`offline`] and does not use it, so that a game compiles neither datasets nor metrics. What both need lies
-//!   further in.
-//! * `plugin` has rings of its own, `component ▶ asset ▶ playback ▶ render ▶ pbr, picker, stereo ▶ picking_backend, inspector, testing`, of
-//!   which `pbr`, `picking_backend` (feature `picking`), `inspector` and `testing` are features. The crate root re-exports them: a game writes `bevy_gs4d::playback`.
-//! * A picture is a [`Picture`](view::Picture), not an `Image`: Bevy and the crate `image` have an `Image` each, and one file may need
-//!   all three.
-//! * `internal`, hidden here, lies outside all rings: it re-exports private items for the tests and benchmarks of this crate.
-//! * `score` is a pass of the offline half, not of a frame: its CPU reference and its pipelines are in [`mod@offline::score`], a client of
-//!   the renderer.
+//! * `plugin` has rings of its own, `component ▶ asset ▶ playback ▶ render ▶ pbr, picker, stereo ▶ picking_backend,
+//!   inspector, testing`, of which `pbr`, `picking_backend` (feature `picking`), `inspector` and `testing` are
+//!   features. The crate root re-exports them: a game writes `bevy_gs4d::playback`.
+//! * A picture is a [`Picture`](view::Picture), not an `Image`: Bevy and the crate `image` have an `Image` each, and
+//!   one file may need all three.
+//! * `internal`, hidden here, is outside all rings: it re-exports private items for the tests and benchmarks of this
+//!   crate.
+//! * `score` is a pass of the offline half, not of a frame: its CPU reference and its pipelines are in
+//!   [`mod@offline::score`], a client of the renderer.
 //!
-//! # Around it, for games
+//! # Modules for games
 //!
-//! [`asset`] reports what happens to files that are loaded and reloaded. [`picker`] finds the Gaussian under a ray. [`stereo`] gives a
-//! head two eyes. [`inspector`] is a panel that shows and changes all of this, [`testing`] renders an app to pictures without a window.
-//! The guide, `docs/guide.md`, goes through them in the order in which a game meets them; `docs/command.md` is the guide of the command.
+//! [`asset`] loads and reloads files, and reports their states. [`picker`] finds the Gaussian that a ray hits.
+//! [`stereo`] has two eyes on one head. [`inspector`] is a panel that shows and edits captures, [`testing`] renders an
+//! app to pictures without a window. `docs/guide.md` is the guide for games, `docs/command.md` the guide of the
+//! command.
 //!
-//! [`GaussianCapturePlugins`] are a group: `GaussianCapturePlugins.build().disable::<CapturePbrPlugin>()` leaves a part out. All components
-//! and resources are reflected and registered, by their public paths, so that scene files can name them.
+//! [`GaussianCapturePlugins`] is a group: `GaussianCapturePlugins.build().disable::<CapturePbrPlugin>()` leaves a part
+//! out. All components and resources are reflected and registered by their public paths, for scene files.
 //!
 //! | component | on | inserted by |
 //! |---|---|---|
 //! | [`GaussianCapture3d`] | a capture in the world | the game |
 //! | [`CaptureState`](asset::CaptureState), [`Playback`](playback::Playback), [`CaptureSettings`](render::CaptureSettings) | captures; `Playback` also timelines | the plugins, unless the game does |
-//! | [`Upright`] | captures | the game; [`UprightTurn`] comes with it |
+//! | [`Upright`] | captures | the game; it requires [`UprightTurn`] |
 //! | [`Markers`](playback::Markers), [`FollowsClock`](playback::FollowsClock) | captures; `FollowsClock` also timelines | the game |
 //! | [`PlaybackClock`](playback::PlaybackClock) | an entity of its own; timelines | the game; the plugins on timelines |
 //! | [`TimelinePlayer`](playback::TimelinePlayer) | a timeline in the world | the game |
@@ -150,16 +157,17 @@
 //!
 //! # From a checkpoint to a small capture
 //!
-//! [`offline`] finds what each Gaussian is worth to the training views ([`mod@offline::score`]), which stay (`offline::prune`),
-//! which are active when (`offline::temporal_filter`), and how few bytes they need ([`mod@offline::quantize`]). `gs4d bake` calls
-//! them in order and reports.
+//! [`offline`] scores the contribution of each Gaussian to the training views ([`mod@offline::score`]), selects the
+//! Gaussians to keep (`offline::prune::select`), makes the masks of the temporal filter
+//! (`offline::filter::temporal_filter`), and quantizes ([`mod@offline::compress`]). `gs4d bake` runs these stages in
+//! order and writes a report.
 //!
-//! # How it is known to be right
+//! # Verification
 //!
-//! * [`mod@reference`] is the CPU reference of the passes of a frame. The tests hold it against the original code's numbers, and the GPU
-//!   against both.
-//! * [`offline::dataset`] reads training views as the trainer does; [`offline::metrics`] are PSNR and SSIM as the original evaluates
-//!   them, MS-SSIM and FLIP.
+//! * [`mod@reference`] is the CPU reference of the passes of a frame. The tests compare it with the numbers of the
+//!   original code, and the GPU with both.
+//! * [`offline::dataset`] reads training views as the trainer does; [`offline::measure`] has PSNR and SSIM as
+//!   the original evaluates them, MS-SSIM and FLIP.
 //!
 //! # Features
 //!
@@ -173,7 +181,7 @@
 //! | `picking` (default) | pointer events on captures | `bevy` |
 //! | `fourdgs` | reading and writing `.4dgs` files | |
 //! | `cli` | [`cli`], the `gs4d` command; never compiles Bevy | `offline`, `fourdgs` |
-//! | `inspector` | [`inspector`]: a panel to watch and control captures with | `bevy` |
+//! | `inspector` | [`inspector`]: a panel that shows and edits captures | `bevy` |
 //! | `testing` | [`testing`]: Bevy apps without a window, drawn into pictures | `bevy` |
 //! | `viewer` | what the examples need: a window, lit meshes | `pbr`, `picking`, `inspector`, `testing` |
 //! | `openxr` | the example `walkthrough` for a headset, untried | `viewer` |

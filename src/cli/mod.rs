@@ -1,61 +1,42 @@
-//! The `gs4d` command: inspects, converts, renders, compares, times and compresses captures.
-//!
-//! One file for each verb: its options, a call of [`offline`](crate::offline), its output. `args` has the options that
-//! verbs share.
+//! The `gs4d` command: trains, inspects, converts, renders, measures and compresses captures.
 //!
 //! In: the command line. Out: one report on standard output (text, or one JSON document with `--json`); progress, notes
-//! and errors on standard error; exit code 0, 2 for any failure, 101 for a panic, 128 + signal when interrupted (130 INT, 143 TERM).
+//! and errors on standard error; exit code 0, 2 for any failure, 101 for a panic, 128 + signal when interrupted (130
+//! INT, 143 TERM).
+//!
+//! | module | subject |
+//! |---|---|
+//! | `verbs` | one file for each verb: its options, a call of [`offline`](crate::offline), its report |
+//! | `args` | the options that verbs share |
+//! | `output` | reports, failures and their remedies, progress, signals |
+//! | `usage` | parsing of the command line |
 
-mod ablate;
 mod args;
-mod bake;
-mod bench;
-mod compare;
-mod compress;
-mod convert;
-mod curve;
-mod detail;
-mod eval;
-mod export;
-mod exposures;
-mod failure;
-mod fine_tune;
-mod fleet;
-mod info;
-mod info_dataset;
-mod interrupt;
-mod mask;
-mod near;
-mod note;
-mod plain;
-mod progress;
-mod prune;
+mod output;
 #[cfg(test)]
 mod remedies;
-mod render;
-mod report;
-mod score;
-mod synth;
-mod system;
-mod table;
-mod train;
 mod usage;
+mod verbs;
 
-use crate::offline::unfinished;
+use crate::offline::work::unfinished;
 use clap::{Parser, Subcommand};
-use failure::Failure;
-use report::Report;
+use output::failure::{FAILED, Failure};
+use output::report::Report;
+use output::{interrupt, note};
 use std::env;
 use std::ffi::OsString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
+use verbs::{
+    ablate, bake, bench, compare, compress, convert, detail, eval, export, fine_tune, fleet, info, mask, prune, render,
+    score, synth, train,
+};
 
-/// The exit code of a verb that fails, and of a command line that cannot be understood.
-const FAILED: u8 = 2;
 /// The exit code after a panic, a defect of this crate.
 const PANICKED: u8 = 101;
 
-/// Dynamic captures (native 4D Gaussian Splatting): train them from pictures, look into them, convert, render, compare, time, make smaller.
+/// Dynamic captures (native 4D Gaussian Splatting): train from pictures, inspect, convert, render, compare, benchmark,
+/// compress.
 #[derive(Parser)]
 #[command(name = "gs4d", version, propagate_version = true, after_help = EXAMPLES)]
 struct Cli {
@@ -73,7 +54,7 @@ Examples:
   gs4d bake chkpnt30000.pth --data pictures -o capture.gs4d
   gs4d render capture.gs4d --orbit 60 --out frames
 
-Every verb explains itself: gs4d VERB --help. Exit codes: 0 done, 2 failed, 130 interrupted, 143 terminated.";
+gs4d VERB --help describes a verb. Exit codes: 0 done, 2 failed, 130 interrupted, 143 terminated.";
 
 #[derive(Subcommand)]
 enum Verb {
@@ -149,7 +130,7 @@ pub fn run() -> ExitCode {
 /// Runs a verb. Returns its report, also after a panic, and the exit code if it has failed.
 fn report_of(verb: impl FnOnce() -> Result<Report, Failure>) -> (Report, u8) {
     match catch_unwind(AssertUnwindSafe(verb)) {
-        Ok(Err(failure)) if failure.is_interruption() && interrupt::is_asked() => {
+        Ok(Err(failure)) if failure.is_interruption() && interrupt::is_requested() => {
             (Report::of_interruption(&unfinished::existing()), FAILED)
         }
         Ok(outcome) => (outcome.unwrap_or_else(Report::of_failure), FAILED),
@@ -166,9 +147,12 @@ mod tests {
     fn panics_are_reported_as_other_failures() {
         let (report, code) = report_of(|| panic!("{} are too many", 7));
         let error = report.json["error"].as_str().expect("an error in the document");
-        assert!(error.contains("7 are too many") && error.contains("report"), "what and what to do: {error}");
-        assert!(code == PANICKED && report.failure.is_some_and(|failure| !failure.is_silent()), "and is a failure");
+        assert!(error.contains("7 are too many") && error.contains("report"), "the panic and the remedy: {error}");
+        assert!(
+            code == PANICKED && report.failure.is_some_and(|failure| !failure.is_silent()),
+            "a panic is a failure with a message"
+        );
         let (report, code) = report_of(|| Err(Failure::from(io::Error::other("no luck"))));
-        assert_eq!((report.json["error"].as_str(), code), (Some("no luck"), FAILED), "a failure stays what it is");
+        assert_eq!((report.json["error"].as_str(), code), (Some("no luck"), FAILED), "a failure keeps its message");
     }
 }

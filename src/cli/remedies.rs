@@ -1,10 +1,10 @@
-//! The commands and options that messages and helps name.
+//! The check of commands and options in messages and help texts.
 //!
-//! In: the string literals of the sources, the texts of `--help`. Out: proof that every `gs4d VERB` in them is a verb, and every `--option` one of
-//! that verb, or of the verb that shows the text: what a message tells to do can be done.
+//! In: the string literals of the sources, the texts of `--help`. Out: proof that every `gs4d VERB` in them is a verb,
+//! and that every `--option` is an option of that verb, or of the verb that shows the text.
 
-use super::Cli;
-use super::args::RULES;
+use crate::cli::Cli;
+use crate::cli::args::RULES;
 use clap::{Arg, Command, CommandFactory};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -15,11 +15,11 @@ type Verbs = BTreeMap<String, BTreeSet<String>>;
 
 /// Words that follow the name of the command in prose.
 const PROSE: [&str; 10] = ["clamp", "does", "opens", "reads", "round", "take", "takes", "that", "works", "writes"];
-/// The option of cargo.
+/// An option of cargo, which messages name.
 const OF_CARGO: &str = "--features";
-/// Files whose literals are style sheets, and this one.
-const LEFT_OUT: [&str; 2] = ["offline/report/html.rs", "cli/remedies.rs"];
-/// Files of verbs that are not called as these.
+/// The file that is not checked: this one.
+const LEFT_OUT: &str = "cli/remedies.rs";
+/// Files of verbs whose names differ from those of the verbs.
 const FILES: [(&str, &str); 3] = [("fine_tune", "finetune"), ("fleet", "report"), ("info_dataset", "info")];
 
 /// Returns the verbs and their options.
@@ -88,7 +88,8 @@ fn options(text: &str) -> Vec<String> {
     text.match_indices("--").map(|(at, _)| at).filter(begins).filter_map(option).collect()
 }
 
-/// Splits a text at the commands in it: the text before the first, and each word after `gs4d` with the text up to the end of the command.
+/// Splits a text at the commands in it. Returns the texts outside of commands, and each word after `gs4d` with the text
+/// up to the end of the command.
 fn commands(text: &str) -> (Vec<&str>, Vec<(&str, &str)>) {
     let (mut outside, mut commands, mut rest) = (Vec::new(), Vec::new(), text);
     while let Some(at) = rest.find("gs4d ") {
@@ -110,7 +111,8 @@ fn commands(text: &str) -> (Vec<&str>, Vec<(&str, &str)>) {
     (outside, commands)
 }
 
-/// Returns what a text names that does not exist. `own` are the options that it may name outside of commands.
+/// Returns the verbs and options in a text that do not exist. `own` are the options that are allowed outside of
+/// commands.
 fn wrong(text: &str, verbs: &Verbs, own: &BTreeSet<String>) -> Vec<String> {
     let (outside, commands) = commands(text);
     let unknown = outside.iter().flat_map(|part| options(part)).filter(|option| !own.contains(option));
@@ -121,7 +123,7 @@ fn wrong(text: &str, verbs: &Verbs, own: &BTreeSet<String>) -> Vec<String> {
                 let unknown = options(arguments).into_iter().filter(|option| !known.contains(option));
                 wrong.extend(unknown.map(|option| format!("gs4d {word} {option}")));
             }
-            // Labels of GPU objects begin with the name.
+            // Labels of GPU objects begin with "gs4d ".
             None if PROSE.contains(&word) || text.starts_with("gs4d ") => {}
             None => wrong.push(format!("gs4d {word}")),
         }
@@ -138,10 +140,10 @@ fn check_folder(folder: &Path, below: &str, verbs: &Verbs, found: &mut Vec<Strin
         let file = format!("{below}{name}");
         if path.is_dir() {
             check_folder(&path, &format!("{file}/"), verbs, found, literals_found);
-        } else if name.ends_with(".rs") && !LEFT_OUT.contains(&file.as_str()) {
+        } else if name.ends_with(".rs") && file != LEFT_OUT {
             let stem = name.trim_end_matches(".rs");
             let verb = FILES.iter().find(|(file, _)| *file == stem).map_or(stem, |(_, verb)| *verb);
-            let own = verbs.get(verb).filter(|_| below == "cli/").unwrap_or(&all);
+            let own = verbs.get(verb).filter(|_| below == "cli/verbs/").unwrap_or(&all);
             let literals = literals(&fs::read_to_string(&path).expect("a source is text"));
             *literals_found += literals.len();
             let wrong =
@@ -162,7 +164,7 @@ fn commands_and_options_are_found_in_texts() {
     assert_eq!(found, [("info", " FILE --b"), ("bake", " --d")], "verbs and their arguments");
     let own = BTreeSet::from(["--a".to_owned()]);
     let wrong = wrong("give --a or --b: gs4d info --json --quality, gs4d inform; another gs4d works", &verbs(), &own);
-    assert_eq!(wrong, ["--b", "gs4d info --quality", "gs4d inform"], "what does not exist");
+    assert_eq!(wrong, ["--b", "gs4d info --quality", "gs4d inform"], "verbs and options that do not exist");
 }
 
 #[test]

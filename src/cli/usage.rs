@@ -1,10 +1,10 @@
 //! Parsing of the command line, and errors of usage.
 //!
-//! In: the arguments of the process. Out: the options; or the exit code, after help or an error has been printed. With `--json` the error is one
-//! JSON document.
+//! In: the arguments of the process. Out: the options; or the exit code, after help or an error has been printed. With
+//! `--json` the error is one JSON document.
 
-use super::failure::{FAILED, Failure};
-use super::report::Report;
+use super::output::failure::{FAILED, Failure};
+use super::output::report::Report;
 use clap::Parser;
 use std::ffi::OsString;
 use std::process::ExitCode;

@@ -1,99 +1,44 @@
-//! The offline half: from pictures, or a trained checkpoint and its training views, to a small, fast capture, with the loss of quality.
+//! The offline half: from pictures, or a trained checkpoint and its training views, to a small, fast capture, with the
+//! loss of quality.
 //!
-//! In: a `GaussianScene`, the views it was trained on, an [`Engine`](engine::Engine) that scores and draws them on
-//! the GPU or the CPU. Out: a smaller scene, packages, pictures, measurements. Build scripts and editors can call every
-//! function as the command does: functions report their [`Progress`] and return data.
+//! In: pictures with their cameras, a `GaussianScene`. Out: a smaller scene, packages, pictures, measurements. Build
+//! scripts and editors can call every function as the command does: functions report their
+//! [`Progress`](work::Progress), return data, and have the error of their module.
 //!
-//! | module | what it does |
+//! The modules, in the order in which data passes through them. A module uses those above it, and none below it:
+//!
+//! | module | what happens to the data |
 //! |---|---|
-//! | [`dataset`], `splits` | reads views and divides them into training, validation and test views |
-//! | `belonging` | checks that images show the capture |
-//! | `gaps` | finds out whether images have transparent pixels or masks |
-//! | `picture_file` | decodes pictures for all other modules |
-//! | [`engine`] | opens the GPU or the CPU reference |
-//! | [`score`] | sums what every Gaussian contributes to the training views |
-//! | `prune`, [`prune_by_views`] | keeps the Gaussians of the highest scores |
-//! | `search`, `trained_search`, `quality` | finds the best score and the smallest count that a loss allows |
-//! | `temporal_filter`, `seen` | find the active Gaussians of each segment of time |
-//! | [`fine_tune`](mod@fine_tune) | trains the remaining Gaussians, to compensate for the removed Gaussians |
-//! | `train` | trains a capture from nothing but pictures |
-//! | [`quantize`], [`convert`] | changes the form that a scene is stored in |
-//! | [`detail`](mod@detail) | makes the same capture with fewer Gaussians, for pictures of few pixels |
-//! | [`bake`](mod@bake), [`report`] | runs all steps in order, resumable, and writes a report |
-//! | `jobs` | plans a bake as jobs for many machines |
-//! | `fleet` | compares the results of many bakes on one page |
-//! | [`metrics`], `evaluation`, `fidelity`, `comparison` | measures how close pictures are |
-//! | [`ablation`] | tabulates the loss by every score, ratio and filter |
-//! | `shaders`, `layout` | compose the passes of scoring and training, and mirror their structures |
-//! | `files` | refuses outputs that are inputs or cannot be written, before anything is computed |
-//! | `shard` | divides work among machines, and puts their parts together |
-//! | `stages`, `store`, `stored` | run stages and keep their results, from which interrupted work resumes |
-//! | `unfinished` | lists the files and folders that are removed if a process ends before its work |
-//! | `export` | writes files of other makes |
-//! | [`orbit`], `render` | draws a scene from all sides, many pictures at a time |
+//! | [`work`] | tasks are reported and interrupted; files are written whole or not at all |
+//! | [`picture_file`] | pictures are decoded |
+//! | [`dataset`] | cameras and images become views, divided into training, validation and test views |
+//! | [`forms`] | a scene is brought into the form that the work needs, or that other programs read |
+//! | `store` | results are kept on disk, so that work resumes and is divided among machines |
+//! | [`engine`] | views are drawn, on the GPU or by the CPU reference |
+//! | [`score`] | the contributions of every Gaussian to the training views are summed to scores |
+//! | [`measure`] | pictures are compared with images: PSNR, SSIM, MS-SSIM, FLIP |
+//! | [`filter`] | the active Gaussians of each segment of time are found |
+//! | [`prune`] | the Gaussians of the highest scores are kept, as many as validation views need |
+//! | [`mod@compress`] | the Gaussians are packed, and their colors are coded by codebooks |
+//! | [`mod@train`] | the Gaussians are trained: from pictures alone, or to compensate for removed Gaussians |
+//! | [`mod@detail`] | levels of fewer Gaussians are made, for pictures of few pixels |
+//! | [`report`] | the result of a bake, or of many, becomes a page |
+//! | [`draw`] | pictures are drawn in bulk, from cameras around the scene if there are no others |
+//! | [`mod@bake`] | all of this in stages, which resume, or as jobs for many machines |
 
-pub mod ablation;
 pub mod bake;
-mod bake_settings;
-pub(crate) mod belonging;
-pub(crate) mod comparison;
-pub mod convert;
+pub mod compress;
 pub mod dataset;
 pub mod detail;
+pub mod draw;
 pub mod engine;
-mod error;
-pub(crate) mod evaluation;
-pub(crate) mod evaluation_parts;
-pub(crate) mod export;
-pub(crate) mod fidelity;
-pub(crate) mod files;
-pub mod fine_tune;
-pub(crate) mod fleet;
-pub(crate) mod gaps;
-pub(crate) mod jobs;
-pub(crate) mod layout;
-pub(crate) mod memory_check;
-pub mod metrics;
-mod node;
-pub mod orbit;
-mod package_size;
-pub(crate) mod picture_file;
-mod progress;
-pub(crate) mod prune;
-pub mod prune_by_views;
-pub(crate) mod quality;
-pub mod quantize;
-pub(crate) mod render;
+pub mod filter;
+pub mod forms;
+pub mod measure;
+pub mod picture_file;
+pub mod prune;
 pub mod report;
-mod save;
 pub mod score;
-pub(crate) mod search;
-pub(crate) mod seen;
-pub(crate) mod shaders;
-pub(crate) mod shard;
-pub(crate) mod sliced;
-pub(crate) mod splits;
-pub(crate) mod stages;
-pub(crate) mod store;
-pub(crate) mod stored;
-mod subject;
-pub(crate) mod temporal_filter;
-pub(crate) mod temporary_file;
-mod test_comparison;
-pub(crate) mod train;
-mod trained_pixel;
-pub(crate) mod trained_search;
-pub(crate) mod unfinished;
-
-pub use error::OfflineError;
-pub use picture_file::PictureError;
-pub(crate) use progress::proceed;
-pub use progress::{NoProgress, Progress};
-pub use save::save;
-pub(crate) use save::{write_beside, write_png, write_settings};
-pub use search::{Goal, ScoreChoice};
-pub(crate) use sliced::sliced;
-pub use splits::{SplitOptions, Splits};
-pub(crate) use subject::Subject;
-pub use temporal_filter::KeyFrames;
-pub(crate) use trained_pixel::trained_pixel;
+pub mod store;
+pub mod train;
+pub mod work;

@@ -4,8 +4,8 @@
 
 use super::effects::Need;
 use super::{Given, values};
-use crate::cli::failure::Failure;
-use crate::cli::note::note;
+use crate::cli::output::failure::Failure;
+use crate::cli::output::note::note;
 use crate::codec::import::Imported;
 use crate::codec::{self, CodecError, InvalidOption, ReadOptions};
 use crate::gaussian::{Model, ShDirection};
@@ -14,53 +14,56 @@ use crate::scene::{GaussianScene, RotationConvention, SceneForm, TrainedCameras,
 use crate::view::RasterFov;
 use std::path::Path;
 
-/// What a checkpoint does not say about itself.
+/// Settings that a checkpoint does not contain.
 #[derive(clap::Args, Default)]
-#[command(next_help_heading = "What a checkpoint does not say (taken from cfg_args beside it, else the default)")]
+#[command(
+    next_help_heading = "Settings that a checkpoint does not contain (taken from cfg_args beside it, else the default)"
+)]
 pub(crate) struct CheckpointArgs {
     #[command(flatten)]
     given: Given,
     /// First and last timestamp of training [default: 0,1].
     #[arg(long, value_name = "T0,T1", value_parser = values::interval, allow_hyphen_values = true)]
     time_interval: Option<[f64; 2]>,
-    /// Background color, 0 to 1 in the space of the pictures; also instead of a package's own [default: 0,0,0].
+    /// Background color, 0 to 1 in the space of the pictures; also replaces that of a package [default: 0,0,0].
     #[arg(long, value_name = "R,G,B", value_parser = values::color, allow_hyphen_values = true)]
     pub background: Option<[f32; 3]>,
     /// Order of the axes when the rotations were trained; unflipped: code before 2024-09-15 [default: flipped].
     #[arg(long, value_name = "CONVENTION", value_parser = values::one_of(&ROTATION_CONVENTIONS))]
     rotation_convention: Option<RotationConvention>,
-    /// Field of view that shapes splats seen by intrinsics cameras: the original's placeholder or the true one; also instead
-    /// of a package's own [default: reference for checkpoints, corrected for files of other makes].
+    /// Field of view that shapes splats seen by intrinsics cameras: the original's placeholder or the true one; also
+    /// replaces that of a package [default: reference for checkpoints, corrected for files of other makes].
     #[arg(long, value_name = "FOV", value_parser = values::one_of(&RASTER_FOVS))]
     raster_fov: Option<RasterFov>,
-    /// Kind of cameras of the training views; also instead of a package's own [default: intrinsics if there is an
+    /// Kind of cameras of the training views; also replaces that of a package [default: intrinsics if there is an
     /// environment map, else fov].
     #[arg(long, value_name = "KIND", value_parser = values::one_of(&TRAINED_CAMERAS))]
     trained_cameras: Option<TrainedCameras>,
-    /// Mean that gives the viewing direction of color; also instead of a package's own [default: canonical].
+    /// Mean that gives the viewing direction of color; also replaces that of a package [default: canonical].
     #[arg(long, value_name = "MEAN", value_parser = values::one_of(&SH_DIRECTIONS))]
     sh_direction: Option<ShDirection>,
-    /// Only the first 16 color coefficients count.
+    /// Use only the first 16 color coefficients.
     #[arg(long)]
     force_sh_3d: bool,
-    /// Added to the temporal variance in the marginal, if positive [default: -1].
+    /// Variance that is added to the temporal variance in the marginal, if positive [default: -1].
     #[arg(long, value_name = "VARIANCE", value_parser = values::number, allow_hyphen_values = true)]
     prefilter_var: Option<f32>,
-    /// Axis that points up; also instead of that of a package or another file [default: +z].
+    /// Axis that points up; also replaces that of a package or another file [default: +z].
     #[arg(long, value_name = "AXIS", value_parser = values::one_of(&UP_AXES), allow_hyphen_values = true)]
     up: Option<UpAxis>,
-    /// Seconds of one pass through the time interval at speed 1, 0 for a still; also instead of a package's own or a dataset's [default:
-    /// the interval's length].
+    /// Seconds of one pass through the time interval at speed 1, 0 for a still; also replaces those of a package or a
+    /// dataset [default: the interval's length].
     #[arg(long, value_name = "SECONDS", value_parser = values::seconds)]
     duration: Option<f32>,
-    /// Marginal at and below which a Gaussian is not drawn, 1/255 to 1; also instead of a package's own [default: what the format has, 0.05 for
-    /// checkpoints].
+    /// Marginal at and below which a Gaussian is not drawn, 1/255 to 1; also replaces that of a package [default: that
+    /// of the format, 0.05 for checkpoints].
     #[arg(long, value_name = "MARGINAL", value_parser = values::number)]
     cutoff: Option<f32>,
     /// Frames a second of a sequence of files, or of the frames in a PLY [default: 30].
     #[arg(long, value_name = "FPS", value_parser = values::number)]
     pub fps: Option<f32>,
-    /// Largest distance between a curved path and the straight pieces that replace it, in middle scales of the Gaussian [default: 0.25].
+    /// Largest distance between a curved path and the straight pieces that replace it, as a multiple of the middle one
+    /// of the Gaussian's three scales [default: 0.25].
     #[arg(long, value_name = "SCALES", value_parser = values::number)]
     tolerance: Option<f32>,
 }
@@ -93,15 +96,17 @@ impl CheckpointArgs {
         }
     }
 
-    /// Opens a capture of any format, and notes what of it the scene does not show.
+    /// Opens a capture of any format, and notes which parts of it the scene does not show.
     ///
     /// # Errors
-    /// Errors of the codec; options that contradict the training settings in a package, or have no effect on the capture.
+    /// Errors of the codec; options that contradict the training settings in a package, or have no effect on the
+    /// capture.
     pub(crate) fn load(&self, path: &Path) -> Result<GaussianScene, Failure> {
         self.load_to_play(path, false)
     }
 
-    /// Opens a capture for files that are played: as [`load`](Self::load); `--fps` has an effect on files that count frames, too.
+    /// Opens a capture to write files that are played: as [`load`](Self::load), but `--fps` also has an effect if the
+    /// written files count frames (`counts_frames`).
     ///
     /// # Errors
     /// As [`load`](Self::load).
@@ -114,7 +119,8 @@ impl CheckpointArgs {
         Ok(scene)
     }
 
-    /// Opens a capture to change it: as [`load`](Self::load), without levels of detail, which are of the scene as it is.
+    /// Opens a capture to change it: as [`load`](Self::load), without its levels of detail, which would not fit the
+    /// changed scene.
     ///
     /// # Errors
     /// As [`load`](Self::load).
@@ -127,7 +133,7 @@ impl CheckpointArgs {
         Ok(scene)
     }
 
-    /// Checks that every option that is for some formats alone has an effect on the scene of this file.
+    /// Checks that every option that is only for some formats has an effect on the scene of this file.
     fn require_effects(&self, path: &Path, scene: &GaussianScene, counts_frames: bool) -> Result<(), Failure> {
         let of_formats = [Need::FrameRate, Need::CurvedPaths, Need::NativeRotations, Need::Trainer];
         if !of_formats.into_iter().any(|need| self.given.depends_on(need)) {
@@ -139,10 +145,10 @@ impl CheckpointArgs {
         let is_moving = matches!(scene.form, SceneForm::Ready(_));
         let is_timed = is_own || !is_moving || format.id == "4dgs";
         self.given.require(Need::FrameRate, counts_frames || !is_timed)?;
-        // Of other intervals the end depends on the rate, too.
+        // The end of another interval depends on the frame rate, too.
         let is_open = self.duration.is_none() || scene.trained_with.time_interval != [0.0, 1.0];
         self.given.require(Need::OpenDuration, counts_frames || is_open)?;
-        // Pieces of paths have windows of time, which a filter opens.
+        // Pieces of paths are drawn in windows of time, which are a temporal filter.
         let is_in_pieces = !is_own && format.id != "sequence" && scene.filter.is_some();
         self.given.require(Need::CurvedPaths, is_in_pieces)?;
         let is_native = matches!(scene.model(), Some(Model::Rotated4d | Model::Unrotated4d));
@@ -170,7 +176,7 @@ impl CheckpointArgs {
     }
 }
 
-/// Returns the failure of a file that cannot be read. An option that is refused is called as on the command line.
+/// Returns the failure of a file that cannot be read. A refused option has its name on the command line.
 fn of_codec(error: CodecError) -> Failure {
     match error.kind.invalid_option() {
         Some(InvalidOption { name, reason }) => Failure::about(&error.path, &format!("{}: {reason}", option_of(name))),

@@ -3,12 +3,11 @@
 //! In: `--data DIR`, sizes, a split. Out: its views inside the capture's time interval.
 
 use super::values;
-use crate::cli::failure::Failure;
-use crate::offline::dataset::Validation;
-use crate::offline::dataset::{Dataset, DatasetError, Split, TrainingView};
-use crate::offline::files::Files;
-use crate::offline::splits::{SplitOptions, Splits, open_split};
-use crate::offline::{OfflineError, Progress};
+use crate::cli::output::failure::Failure;
+use crate::offline::dataset::splits::open_split;
+use crate::offline::dataset::{Dataset, DatasetError, Split, SplitOptions, Splits, TrainingView, Validation};
+use crate::offline::store::outputs::Files;
+use crate::offline::work::Progress;
 use crate::scene::TrainedWith;
 use glam::UVec2;
 use std::path::{Path, PathBuf};
@@ -17,17 +16,20 @@ use std::path::{Path, PathBuf};
 #[derive(clap::Args)]
 #[command(next_help_heading = "Training data")]
 pub(crate) struct DataArgs {
-    /// Folder of the dataset that the capture was trained on: `transforms_train.json` (Blender, D-NeRF), `transforms.json` (nerfstudio),
-    /// `poses_bounds.npy` (N3V) or `sparse/0` (COLMAP). Cameras and times are enough unless results are compared with the images.
+    /// Folder of the dataset that the capture was trained on: `transforms_train.json` (Blender, D-NeRF),
+    /// `transforms.json` (nerfstudio), `poses_bounds.npy` (N3V), `sparse/0` (COLMAP) and others (docs/command.md).
+    /// Cameras and times are enough unless results are compared with the images.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// Picture size [default: w and h of the camera file, else that of the first image found beside it, after --resolution].
+    /// Picture size [default: w and h of the camera file, else that of the first image found beside it, after
+    /// --resolution].
     #[arg(long, value_name = "WxH", value_parser = values::size, requires = "data")]
     size: Option<UVec2>,
     /// Divisor of the picture size (1, 2, 3, 4, 8), -1 (at most 1600 wide) or a target width, as in training.
     #[arg(long, value_name = "N", allow_negative_numbers = true, conflicts_with = "size", requires = "data")]
     resolution: Option<i32>,
-    /// Read every view at time 0, as of a scene at rest; images in subfolders of a COLMAP dataset are then no frames of cameras.
+    /// Read every view at time 0, as of a scene at rest; images in subfolders of a COLMAP dataset are then no frames of
+    /// cameras.
     #[arg(id = "static", long = "static", requires = "data")]
     is_static: bool,
 }
@@ -67,11 +69,7 @@ impl DataArgs {
         progress: &mut dyn Progress,
     ) -> Result<Splits, Failure> {
         let options = self.options(validation.validation);
-        let splits = Splits::open(self.folder()?, &options, trained_with, progress);
-        splits.map_err(|error| match error {
-            OfflineError::Dataset(error) => or_give_size(error),
-            error => error.into(),
-        })
+        Splits::open(self.folder()?, &options, trained_with, progress).map_err(or_give_size)
     }
 
     /// Returns how the views are read and divided.
@@ -81,7 +79,9 @@ impl DataArgs {
 
     fn folder(&self) -> Result<&Path, Failure> {
         self.data.as_deref().ok_or_else(|| {
-            Failure::new("this needs the training views: give --data DIR, the folder that the capture was trained on")
+            Failure::new(
+                "the training views are needed: give --data DIR, the folder of the dataset that the capture was trained on",
+            )
         })
     }
 }
@@ -90,8 +90,9 @@ impl DataArgs {
 #[derive(Debug, Clone, Copy, clap::Args)]
 #[command(next_help_heading = "Validation")]
 pub(crate) struct ValidationArgs {
-    /// The views that every choice is made on, which nothing is trained on before: those of the dataset's own split `val` (file), whole cameras, blocks
-    /// of time (times), or none; auto takes the first of these that the data allows.
+    /// Validation views, on which every choice is made and nothing is trained before: those of the dataset's own split
+    /// `val` (file), whole cameras, blocks of time (times), or none; auto takes the first of these that the data
+    /// allows.
     #[arg(long, value_name = "VIEWS", default_value = "auto", value_parser = values::one_of(&Validation::NAMES))]
     pub validation: Validation,
     /// Skip the check that the images show the capture.
@@ -99,7 +100,7 @@ pub(crate) struct ValidationArgs {
     pub trust_images: bool,
 }
 
-/// Returns the failure of a verb that takes `--size`.
+/// Returns the failure of a verb that has the option `--size`, which is a further remedy for an unknown size.
 pub(super) fn or_give_size(error: DatasetError) -> Failure {
     match &error {
         DatasetError::SizeUnknown { .. } => Failure::new(format!("{error}, or give --size WxH")),
@@ -111,14 +112,16 @@ pub(super) fn or_give_size(error: DatasetError) -> Failure {
 #[derive(clap::Args)]
 #[command(next_help_heading = "Data")]
 pub(crate) struct SplitArgs {
-    /// Folder of the dataset, with `transforms_train.json` and `transforms_test.json` (Blender, D-NeRF), `transforms.json` (nerfstudio),
-    /// `poses_bounds.npy` (N3V) or `sparse/0` (COLMAP); gs4d info DIR describes it.
+    /// Folder of the dataset, with `transforms_train.json` and `transforms_test.json` (Blender, D-NeRF),
+    /// `transforms.json` (nerfstudio), `poses_bounds.npy` (N3V), `sparse/0` (COLMAP) and others (docs/command.md); gs4d
+    /// info DIR describes it.
     #[arg(long, value_name = "DIR")]
     pub data: PathBuf,
     /// Divisor of the picture size (1, 2, 3, 4, 8), -1 (at most 1600 wide) or a target width, as in training.
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub resolution: Option<i32>,
-    /// Read every view at time 0, as of a scene at rest; images in subfolders of a COLMAP dataset are then no frames of cameras.
+    /// Read every view at time 0, as of a scene at rest; images in subfolders of a COLMAP dataset are then no frames of
+    /// cameras.
     #[arg(id = "static", long = "static")]
     pub is_static: bool,
 }
@@ -156,7 +159,7 @@ impl SplitArgs {
         validation: ValidationArgs,
         trained_with: &TrainedWith,
         progress: &mut dyn Progress,
-    ) -> Result<Splits, OfflineError> {
+    ) -> Result<Splits, DatasetError> {
         Splits::open(&self.data, &self.options(validation.validation), trained_with, progress)
     }
 }

@@ -1,10 +1,11 @@
 //! When options have an effect: one table for all verbs.
 //!
-//! In: what an input or the other options lack. Out: the options that have no effect without it, and why. [`Given::require`](super::Given::require)
-//! refuses these options. What can be said about two options whatever their values is said to clap (`conflicts_with`, `requires`).
-//! `tests/cli/options.rs` checks every option of every verb: it always has an effect, or is refused where it has none.
+//! In: what an input or the other options lack. Out: the options that have no effect without it, and why.
+//! [`Given::require`](super::Given::require) refuses these options. Rules about two options that hold for all of their
+//! values are clap's (`conflicts_with`, `requires`). `tests/cli/options.rs` checks every option of every verb: it
+//! always has an effect, or is refused where it has none.
 
-/// What some options need for an effect.
+/// What some options need to have an effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Need {
     // Of a capture that is read.
@@ -14,7 +15,7 @@ pub(crate) enum Need {
     OpenDuration,
     /// Paths that are curved in the file.
     CurvedPaths,
-    /// Native 4D rotations, whose convention the file may leave open.
+    /// Native 4D rotations, whose convention is open if the file does not have it.
     NativeRotations,
     /// A file of the 4DGS trainer, or a package of one.
     Trainer,
@@ -36,8 +37,8 @@ pub(crate) enum Need {
     Motion,
     /// No environment map.
     OpenBackground,
-    // Of what is made.
-    /// A result that is played, or says how.
+    // Of the result.
+    /// A result that is played, or has a duration.
     Playback,
     /// A result that has a background.
     Background,
@@ -47,16 +48,16 @@ pub(crate) enum Need {
     AllGaussians,
     /// Files of one time each.
     OneTime,
-    /// A work that is not divided, or the last step of one that is.
+    /// Work that is not divided into shards, or the merge of its shards.
     Whole,
-    /// The work itself, and not the parts of its shards.
+    /// The computation itself, and not only the parts of its shards.
     Work,
     /// Pictures that are written.
     WrittenPictures,
     // Of the engine.
-    /// A GPU, which may be there.
+    /// An engine that may be a GPU.
     Gpu,
-    /// A GPU that was found.
+    /// An engine that is a GPU.
     FoundGpu,
     // Of scores and filters.
     /// A score that uses the volume.
@@ -71,9 +72,9 @@ pub(crate) enum Need {
     PrunedViews,
     /// A filter that depends on what views see.
     FilteredViews,
-    /// Views that say when key-frames are.
+    /// Views whose times determine the key-frames.
     KeyFrameViews,
-    /// Validation views of their own.
+    /// Validation views that are divided from the training views.
     DividedViews,
     // Of compression.
     /// Views that are compared with the original.
@@ -117,15 +118,15 @@ pub(crate) enum Need {
 /// The options that have no effect without what they need.
 #[derive(Debug)]
 pub(crate) struct Rule {
-    /// What they need.
+    /// The need of the options.
     pub need: Need,
     /// The options (`--name`). A verb that states the need has some of them.
     pub options: &'static [&'static str],
-    /// Completes the sentence "OPTION has no effect ..."; it says what would give it one, unless that is plain.
+    /// Completes the sentence "OPTION has no effect ..." and names what would give it one, unless that is obvious.
     pub reason: &'static str,
 }
 
-/// The options of [`CheckpointArgs`](super::CheckpointArgs) that are of captures alone, and not of captures trained from pictures.
+/// The options of [`CheckpointArgs`](super::CheckpointArgs) that have no effect on captures trained from pictures.
 const OF_TRAINED: &[&str] = &[
     "--rotation-convention",
     "--raster-fov",
@@ -140,7 +141,7 @@ const OF_TRAINED: &[&str] = &[
 ];
 /// The other options of [`CheckpointArgs`](super::CheckpointArgs).
 const OF_BOTH: &[&str] = &["--time-interval", "--background", "--duration"];
-/// The options of verbs that choose an engine which have an effect on a GPU alone.
+/// The options that have an effect only on a GPU, of verbs that choose an engine.
 const OF_GPU: &[&str] = &["--adapter", "--checks", "--renderer", "--steps", "--batch", "--rounds", "--exposure"];
 
 /// Every option that does not always have an effect.
@@ -211,17 +212,17 @@ pub(crate) const RULES: &[Rule] = &[
     Rule {
         need: Need::Playback,
         options: &["--duration"],
-        reason: "on what is made here, which is not played: packages keep a duration, and sequences and formats with motion have one",
+        reason: "on the result of this verb, which is not played: packages keep a duration, and sequences and formats with motion have one",
     },
     Rule {
         need: Need::Background,
         options: &["--background"],
-        reason: "on what is made here, which has no background: pictures have one, and packages keep it",
+        reason: "on the result of this verb, which has no background: pictures have one, and packages keep it",
     },
     Rule {
         need: Need::UpAxis,
         options: &["--up"],
-        reason: "on views that are given: an orbit turns about the axis, and packages keep it",
+        reason: "on the views of a dataset or a camera file: an orbit turns about the axis, and packages keep it",
     },
     Rule {
         need: Need::AllGaussians,

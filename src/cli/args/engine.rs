@@ -4,7 +4,7 @@
 
 use super::effects::Need;
 use super::{Given, values};
-use crate::cli::failure::Failure;
+use crate::cli::output::failure::Failure;
 use crate::offline::engine::{Engine, EngineChoice, EngineSettings, GpuSettings};
 use crate::renderer::{Design, GpuError, Headless, ShaderChecks};
 
@@ -12,7 +12,7 @@ use crate::renderer::{Design, GpuError, Headless, ShaderChecks};
 #[derive(clap::Args)]
 #[command(next_help_heading = "Engine")]
 pub(crate) struct EngineArgs {
-    /// Where to score and draw: cpu, gpu, or auto: the GPU unless there is none but a software driver.
+    /// Where to score and draw: cpu, gpu, or auto: a hardware GPU if there is one, else the CPU.
     #[arg(long, value_name = "ENGINE", default_value = "auto", value_parser = values::one_of(&EngineChoice::NAMES))]
     engine: EngineChoice,
     #[command(flatten)]
@@ -23,7 +23,7 @@ impl EngineArgs {
     /// Checks that no option of a GPU is given with `--engine cpu`.
     ///
     /// # Errors
-    /// The first of them that is given.
+    /// The first such option.
     pub(crate) fn check(&self, given: &Given) -> Result<(), Failure> {
         given.require(Need::Gpu, self.engine != EngineChoice::Cpu)
     }
@@ -36,7 +36,7 @@ impl EngineArgs {
     /// Opens the engine, after [`check`](Self::check).
     ///
     /// # Errors
-    /// The requested GPU cannot be used; an option of a GPU is given, and there is none but a software driver.
+    /// The requested GPU cannot be used; an option of a GPU is given, and the engine is the CPU.
     pub(crate) fn open(&self, given: &Given) -> Result<Engine, Failure> {
         self.check(given)?;
         let engine = Engine::open(&EngineSettings { choice: self.engine, gpu: self.gpu.settings() })?;
@@ -48,13 +48,13 @@ impl EngineArgs {
 /// How views are drawn.
 #[derive(clap::Args)]
 pub(crate) struct DesignArgs {
-    /// How views are drawn on a GPU; all draw the same picture. bins: tile bins; sort: a global sort; auto: bins,
-    /// but sort on a software driver, where bins take about four times as long: it emulates the barriers of their sort.
+    /// How views are drawn on a GPU; the pictures are the same. bins: tile bins; sort: a global sort; auto: bins, but
+    /// sort on a software driver, where bins take about four times as long: it emulates the barriers of their sort.
     #[arg(long, value_name = "RENDERER", default_value = "auto", value_parser = values::one_of(&Design::NAMES))]
     pub renderer: Design,
 }
 
-/// How views are drawn, and where.
+/// How views are drawn, and on which GPU.
 #[derive(clap::Args)]
 pub(crate) struct RendererArgs {
     #[command(flatten)]
@@ -63,10 +63,10 @@ pub(crate) struct RendererArgs {
     gpu: GpuArgs,
 }
 
-/// In which ways views are drawn, and where.
+/// The renderers to compare, and the GPU on which they draw.
 #[derive(clap::Args)]
 pub(crate) struct RenderersArgs {
-    /// How views are drawn, one or more; all draw the same picture. bins: tile bins; sort: a global sort; auto: bins,
+    /// How views are drawn, one or more; the pictures are the same. bins: tile bins; sort: a global sort; auto: bins,
     /// but sort on a software driver, where bins take about four times as long: it emulates the barriers of their sort.
     #[arg(id = "renderer", long = "renderer", value_name = "RENDERER,..", default_value = "auto", value_delimiter = ',',
         value_parser = values::one_of(&Design::NAMES))]
@@ -97,11 +97,12 @@ impl RendererArgs {
     }
 }
 
-/// Which GPU draws, and how carefully.
+/// Which GPU draws, and whether shaders check array indices.
 #[derive(clap::Args)]
 #[command(next_help_heading = "GPU")]
 struct GpuArgs {
-    /// The adapter: part of its name in any case, or its index. A wrong one lists those there are [default: the fastest].
+    /// The adapter: part of its name, upper or lower case, or its index. A wrong value lists all adapters [default: the
+    /// fastest].
     #[arg(long, value_name = "NAME|INDEX")]
     adapter: Option<String>,
     /// Have shaders check every array index (slower; to look for defects).

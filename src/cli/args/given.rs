@@ -1,15 +1,15 @@
 //! The options that a command line names, and the refusal of those that have no effect.
 //!
-//! In: the arguments of a verb, and what its input or its other options lack. Out: an error that names the first option without an effect, why it
-//! has none, and the remedy. The table of [`effects`](super::effects) decides.
+//! In: the arguments of a verb, and what its input or its other options lack. Out: an error that names the first option
+//! without an effect, the reason, and the remedy, by the table of [`effects`](super::effects).
 
 use super::effects::{Need, RULES};
-use crate::cli::failure::Failure;
+use crate::cli::output::failure::Failure;
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Args, Command, FromArgMatches};
 
-/// The options that the command line names, without those that have their default values. It must be the first field of the options of a verb,
-/// or of a group of options: the fields before it have taken their values out of the matches.
+/// The options that the command line names, without those that have their default values. It must be the first field of
+/// the options of a verb, or of a group of options: fields before it have taken their values out of the matches.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Given(Vec<String>);
 

@@ -1,6 +1,7 @@
 //! Groups of options that several verbs share, and how the values of options are spelled.
 //!
-//! In: the part of the command line that belongs to a group. Out: settings of the library, or what it opens with them.
+//! In: the part of the command line that belongs to a group. Out: settings of the library, or the engine, scene or
+//! views that are opened with them.
 
 mod checkpoint;
 mod data;

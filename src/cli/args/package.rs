@@ -2,9 +2,9 @@
 //!
 //! In: options, the files that are read, a scene. Out: the package on disk.
 
-use crate::cli::failure::Failure;
-use crate::offline::files::Files;
-use crate::offline::{self, write_settings};
+use crate::cli::output::failure::Failure;
+use crate::offline::store::outputs::Files;
+use crate::offline::work::{save, write_settings};
 use crate::scene::GaussianScene;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
@@ -12,10 +12,10 @@ use std::{fs, io};
 /// Where to write a package, and how.
 #[derive(clap::Args)]
 pub(crate) struct PackageArgs {
-    /// The package to write (.gs4d). A file that is there is replaced, once the new one is whole.
+    /// The package to write (.gs4d). An existing file is replaced when the new one is complete.
     #[arg(value_name = "OUT", required_unless_present = "out_option")]
     out: Option<PathBuf>,
-    /// The package to write, said the other way.
+    /// The package to write, as an option.
     #[arg(short = 'o', long = "out", value_name = "OUT", conflicts_with = "out")]
     out_option: Option<PathBuf>,
     /// zstd level, 1 (fast) to 19 (small) [default: 9; of packed captures 19].
@@ -33,7 +33,8 @@ impl PackageArgs {
         out.ok_or_else(|| Failure::new("no OUT is given: name the package to write"))
     }
 
-    /// Returns the path to write to, after checking that a package can be written there; `files` are those that the verb reads.
+    /// Returns the path to write to, after a check that a package can be written there; `files` are those that the verb
+    /// reads.
     ///
     /// # Errors
     /// As [`out`](Self::out), and those of [`Files::check`].
@@ -43,7 +44,8 @@ impl PackageArgs {
         Ok(out)
     }
 
-    /// As [`checked_out`](Self::checked_out), for verbs that read the package again or write others beside it: a device or a pipe is refused.
+    /// As [`checked_out`](Self::checked_out), for verbs that read the package again or write other files beside it: a
+    /// device or a pipe is refused.
     ///
     /// # Errors
     /// As [`checked_out`](Self::checked_out).
@@ -60,7 +62,7 @@ impl PackageArgs {
     pub(crate) fn save(&self, scene: &GaussianScene) -> Result<u64, Failure> {
         let out = self.out()?;
         let settings = write_settings(&scene.form, self.level);
-        offline::save(out, scene, &settings)?;
+        save(out, scene, &settings)?;
         file_size(out)
     }
 }

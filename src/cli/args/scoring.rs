@@ -1,13 +1,12 @@
-//! The score, and the views that it comes from.
+//! The score, and the views that it is computed from.
 //!
 //! In: the name of a score, the options for scoring. Out: a [`ScoreChoice`], [`ScoringSettings`].
 
 use super::effects::Need;
 use super::{Given, values};
-use crate::cli::failure::Failure;
-use crate::offline::score::Variant;
-use crate::offline::score::{ScoreSettings, ScoringSettings};
-use crate::offline::search::ScoreChoice;
+use crate::cli::output::failure::Failure;
+use crate::offline::prune::ScoreChoice;
+use crate::offline::score::{ScoreSettings, ScoringSettings, Variant};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 /// Returns a parser for `auto`, `all` (if `with_all`) or the name of a score.
@@ -20,14 +19,14 @@ pub(crate) fn score_choice(with_all: bool) -> impl TypedValueParser<Value = Scor
     })
 }
 
-/// From which views scores come, and how.
+/// From which views scores are computed, and how.
 #[derive(clap::Args)]
 #[command(next_help_heading = "Scoring")]
 pub(crate) struct ScoringArgs {
     /// Score with an even subset of N views [default: all].
     #[arg(long, value_name = "N", value_parser = values::count(10_000_000))]
     views: Option<usize>,
-    /// Power of the volume in the paper's factor; 0 leaves it out.
+    /// Power of the volume in the paper's factor; 0 leaves the volume out.
     #[arg(long, value_name = "P", default_value = "0.1", value_parser = values::not_negative)]
     volume_power: f64,
     /// Share of the volumes, from the largest down, at which the paper's reference volume lies.

@@ -4,15 +4,15 @@
 
 use super::Given;
 use super::effects::Need;
-use crate::cli::failure::Failure;
-use crate::offline::shard::Shard;
+use crate::cli::output::failure::Failure;
+use crate::offline::store::shard::Shard;
 use std::path::{Path, PathBuf};
 
 /// The shards of a computation.
 #[derive(clap::Args)]
 #[command(next_help_heading = "Shards")]
 pub(crate) struct ShardArgs {
-    /// Do only shard I of N, 0/N to N-1/N, and write its part to OUT; a part that is there with the same inputs is left as it is.
+    /// Compute only shard I of N, 0/N to N-1/N, and write its part to OUT; an existing part of the same inputs is kept.
     #[arg(long, value_name = "I/N", conflicts_with = "merge")]
     shard: Option<Shard>,
     /// Put the parts of all shards together instead of computing: the result is that of one computation.
@@ -23,19 +23,19 @@ pub(crate) struct ShardArgs {
 /// The extension of parts.
 pub(crate) const PART: &str = "gs4p";
 
-/// What to do of a computation.
+/// Which portion of a computation to do.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Portion<'a> {
     /// All of it.
     All,
     /// One shard.
     Shard(Shard),
-    /// Nothing: these are the parts of all shards.
+    /// None: these are the parts of all shards.
     Parts(&'a [PathBuf]),
 }
 
 impl ShardArgs {
-    /// Returns what to do.
+    /// Returns the portion to do.
     pub(crate) fn portion(&self) -> Portion<'_> {
         match self.shard {
             Some(shard) => Portion::Shard(shard),
@@ -57,10 +57,10 @@ impl ShardArgs {
         out.ok_or_else(|| Failure::new("no OUT is given: name the part to write, with -o"))
     }
 
-    /// Checks that no option that has an effect on the whole alone is given with `--shard`.
+    /// Checks that no option that has an effect only on the whole computation is given with `--shard`.
     ///
     /// # Errors
-    /// The first of them that is given.
+    /// The first such option.
     pub(crate) fn check(&self, given: &Given) -> Result<(), Failure> {
         given.require(Need::Whole, self.shard.is_none())
     }

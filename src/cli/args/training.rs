@@ -3,9 +3,9 @@
 //! In: options. Out: [`FineTuneSettings`], in which the verb sets the others.
 
 use super::values;
-use crate::offline::fine_tune::{Behind, FineTuneSettings, Terms};
+use crate::offline::train::{Behind, FineTuneSettings, Terms};
 
-/// How each step is made.
+/// Settings of each step.
 #[derive(clap::Args)]
 pub(crate) struct TrainingArgs {
     /// Views of each step.
@@ -20,11 +20,13 @@ pub(crate) struct TrainingArgs {
     /// Weight, in the loss, of motion that differs from that of the 20 nearest Gaussians: the original's rigid term.
     #[arg(long, help_heading = "Experimental", value_name = "WEIGHT", default_value = "0", value_parser = values::not_negative)]
     rigid_weight: f64,
-    /// Train an exposure for each camera: gains, mixtures and offsets of red, green and blue, for pictures whose cameras differ in exposure or
-    /// white balance. OUT has the mean exposure of the training cameras; exposures are not stored in it, and no evaluation uses them.
+    /// Train an exposure for each camera: gains, mixtures and offsets of red, green and blue, for pictures whose
+    /// cameras differ in exposure or white balance. OUT has the mean exposure of the training cameras; exposures are
+    /// not stored in it, and no evaluation uses them.
     #[arg(long)]
     exposure: bool,
-    /// Background of images with transparent pixels: random, a random color for each view, or fixed, the background of training.
+    /// Background of images with transparent pixels: random, a random color for each view, or fixed, the background of
+    /// training.
     #[arg(long, value_name = "WHAT", default_value = "random", value_parser = values::one_of(&BEHIND))]
     behind: Behind,
     /// End after this number of evaluations without an improvement [default: make all steps].

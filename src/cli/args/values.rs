@@ -3,7 +3,7 @@
 //! In: the text after an option. Out: the value, or as an error the reason, which clap shows with the option's name.
 
 use crate::offline::dataset::MAX_SIDE;
-use crate::offline::temporal_filter::KeyFrames;
+use crate::offline::filter::KeyFrames;
 use clap::builder::{PossibleValuesParser, RangedU64ValueParser, TypedValueParser};
 use glam::UVec2;
 
@@ -20,7 +20,7 @@ pub(crate) fn color(text: &str) -> Result<[f32; 3], String> {
     numbers(text).ok_or_else(|| "expected three numbers, such as 0,0.5,1".to_owned())
 }
 
-/// Parses `T0,T1` with T0 before T1, in double precision: seconds since 1970 have no place in single precision.
+/// Parses `T0,T1` with T0 before T1, in double precision: seconds since 1970 lose their fractions in single precision.
 pub(crate) fn interval(text: &str) -> Result<[f64; 2], String> {
     let time = |text: &str| text.trim().parse::<f64>().ok().filter(|time| time.is_finite());
     let times = text.split_once(',').and_then(|(first, last)| time(first).zip(time(last)));
@@ -114,7 +114,7 @@ mod tests {
             assert!(share(text).is_err(), "{text:?} is no share");
         }
         assert!(not_negative("-1").is_err() && not_negative("inf").is_err(), "finite and not below zero");
-        assert!(not_negative("1e6").is_ok() && not_negative("1e308").is_err(), "no more than any use needs");
+        assert!(not_negative("1e6").is_ok() && not_negative("1e308").is_err(), "at most the largest value");
         assert!(step("-1").is_err() && step("1e308").is_err(), "in single precision and not below zero");
         for text in ["1,1", "1", "1,2,3", "0,inf", "nan,1"] {
             assert!(interval(text).is_err(), "{text:?} is no interval with a length");

@@ -4,11 +4,12 @@
 
 use super::data::or_give_size;
 use super::values;
-use crate::cli::failure::Failure;
-use crate::cli::note::note;
+use crate::cli::output::failure::Failure;
+use crate::cli::output::note::note;
 use crate::offline::dataset::{CameraFile, CameraOptions};
-use crate::offline::files::Files;
-use crate::offline::orbit::{ORBIT_SIZE, Shot, orbit};
+use crate::offline::draw::orbit::ORBIT_SIZE;
+use crate::offline::draw::{Shot, orbit};
+use crate::offline::store::outputs::Files;
 use crate::scene::RuntimeScene;
 use crate::view::Lens;
 use glam::UVec2;
@@ -27,8 +28,8 @@ pub(crate) struct ViewArgs {
     /// Draw every view at this time.
     #[arg(long, value_name = "T", value_parser = values::number, allow_hyphen_values = true)]
     time: Option<f32>,
-    /// Picture size [default: w and h of the camera file, else that of the first image found beside it, after --resolution;
-    /// 400x400 for --orbit].
+    /// Picture size [default: w and h of the camera file, else that of the first image found beside it, after
+    /// --resolution; 400x400 for --orbit].
     #[arg(long, value_name = "WxH", value_parser = values::size)]
     size: Option<UVec2>,
     /// Divisor of the picture size (1, 2, 3, 4, 8), -1 (at most 1600 wide) or a target width, as in training.
@@ -42,7 +43,7 @@ impl ViewArgs {
         self.cameras.iter().fold(files, |files, path| files.reads_cameras(path))
     }
 
-    /// Returns whether the views are on an orbit about the axis that points up.
+    /// Returns whether the views are on an orbit, which turns about the axis that points up.
     pub(crate) fn are_of_orbit(&self) -> bool {
         self.cameras.is_none()
     }

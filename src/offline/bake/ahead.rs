@@ -1,20 +1,23 @@
 //! What can be refused before the first stage of a bake.
 //!
-//! In: the settings, the division of the views, an engine. Out: the error of the stage that would fail because of these alone: validation views,
-//! images, memory, the adapter.
+//! In: the settings, the division of the views, an engine. Out: the error of the stage that would fail because of these
+//! alone: missing validation views or images, too little memory, too large pictures.
 
-use crate::offline::bake_settings::BakeSettings;
-use crate::offline::dataset::TrainingView;
+use super::BakeError;
+use super::settings::BakeSettings;
+use crate::offline::dataset::splits::Splits;
+use crate::offline::dataset::{DatasetError, TrainingView};
 use crate::offline::engine::Engine;
-use crate::offline::fine_tune::{TrainingImages, obstacle};
-use crate::offline::memory_check::{BY_RESOLUTION, Pictures};
-use crate::offline::metrics::MetricSet;
-use crate::offline::search::{Goal, ScoreChoice, no_validation};
-use crate::offline::splits::Splits;
-use crate::offline::{OfflineError, Progress};
+use crate::offline::engine::Purpose;
+use crate::offline::engine::memory::Pictures;
+use crate::offline::measure::memory::evaluated;
+use crate::offline::measure::metrics::MetricSet;
+use crate::offline::prune::search::{Goal, ScoreChoice, no_validation};
+use crate::offline::train::{TrainingImages, untrainable::obstacle};
+use crate::offline::work::Progress;
 use crate::scene::GaussianScene;
 
-/// Checks everything that depends on the settings, the views and the engine alone.
+/// Checks what depends on the settings, the views and the engine alone.
 ///
 /// # Errors
 /// As [`require_validation`]; pictures that do not fit the memory or the GPU.
@@ -23,12 +26,13 @@ pub(super) fn check(
     splits: &Splits,
     views: &[TrainingView],
     engine: &Engine,
-) -> Result<(), OfflineError> {
+) -> Result<(), BakeError> {
     require_validation(settings, splits)?;
-    Pictures::looked_at(views).require(engine.headless(), BY_RESOLUTION)?;
-    Pictures::compared(&splits.validation).require(engine.headless(), BY_RESOLUTION)?;
-    // The test views, which are of the same sizes.
-    Pictures::evaluated(views, MetricSet::ALL, true).require(engine.headless(), BY_RESOLUTION)?;
+    // The test views have the sizes of the training views.
+    let evaluated = evaluated(views, MetricSet::ALL, true);
+    for pictures in [Pictures::looked_at(views), Pictures::compared(&splits.validation), evaluated] {
+        pictures.require(engine.headless(), Purpose::Dataset)?;
+    }
     if let Some(headless) = engine.headless().filter(|_| settings.fine_tune.is_some()) {
         TrainingImages::require_room(&splits.train, &splits.validation, headless)?;
     }
@@ -39,26 +43,22 @@ pub(super) fn check(
 ///
 /// # Errors
 /// There are no validation views, or an image is missing.
-pub(crate) fn require_validation(settings: &BakeSettings, splits: &Splits) -> Result<(), OfflineError> {
+pub(super) fn require_validation(settings: &BakeSettings, splits: &Splits) -> Result<(), BakeError> {
     let by_loss = matches!(settings.goal, Goal::MaxLoss(_));
     if !by_loss && matches!(settings.score, ScoreChoice::One(_)) {
         return Ok(());
     }
     if splits.validation.is_empty() {
-        return Err(no_validation(by_loss));
+        return Err(no_validation(by_loss).into());
     }
     match splits.validation.iter().find(|view| by_loss && !view.image.is_file()) {
-        Some(view) => Err(OfflineError::at(
-            &view.image,
-            "is missing: a loss is measured on the images of the validation views; put them beside the camera file, \
-             or give --ratio or --keep",
-        )),
+        Some(view) => Err(BakeError::MissingImage { image: view.image.clone() }),
         None => Ok(()),
     }
 }
 
-/// Returns why Gaussians would not be trained after they have been pruned, whatever the engine: their form, or an image that is missing. `None` if
-/// they would be.
+/// Returns why the Gaussians would not be trained after pruning, with any engine: their form, or a missing image.
+/// `None` if they would be trained.
 ///
 /// # Errors
 /// Views that cannot be used.
@@ -66,7 +66,7 @@ pub(crate) fn obstacle_to_tuning(
     scene: &GaussianScene,
     settings: &BakeSettings,
     progress: &mut dyn Progress,
-) -> Result<Option<String>, OfflineError> {
+) -> Result<Option<String>, DatasetError> {
     let splits = Splits::open(&settings.data, &settings.splits, &scene.trained_with, progress)?;
     Ok(obstacle(&scene.form, &splits.all_training(&scene.trained_with, progress)?))
 }

@@ -1,24 +1,26 @@
 //! The stages score and prune of a bake: which Gaussians to keep.
 //!
-//! In: a checkpoint, the views to train on, the validation views. Out: the scores of all Gaussians ([`Candidate`]); the score and the count
-//! that are best for the goal on the validation views, and every count tried ([`Choice`]). If the remaining Gaussians are trained, scores
-//! and losses are compared after a short training: the best choice before training is not the best choice after training.
+//! In: a checkpoint, the views to train on, the validation views. Out: the scores of all Gaussians ([`Candidate`]); the
+//! score and the count that are best for the goal on the validation views, and every count tried ([`Choice`]). If the
+//! remaining Gaussians are trained, scores and losses are compared after a short training: the best choice before
+//! training is not the best choice after training.
 
+use super::BakeError;
 use super::inputs::Inputs;
+use super::job::{Scoring, shard_name};
+use super::merged_scores::merged_scores;
 use super::size::count_of_size;
+use super::trained_search::TrainedSearch;
 use super::tuning::short;
 use crate::offline::engine::Engine;
-use crate::offline::jobs::job::{Scoring, shard_name};
-use crate::offline::jobs::merged_scores::merged_scores;
-use crate::offline::quality::Trial;
+use crate::offline::prune::Trial;
+use crate::offline::prune::search::{Candidate, Goal, ScoreChoice, ScoreSearch, SearchSummary, candidates};
 use crate::offline::report::Tried;
 use crate::offline::score::Scores;
-use crate::offline::search::{Candidate, Goal, ScoreChoice, ScoreSearch, candidates};
-use crate::offline::stages::Stages;
-use crate::offline::store::Key;
-use crate::offline::stored::Text;
-use crate::offline::trained_search::TrainedSearch;
-use crate::offline::{OfflineError, Progress};
+use crate::offline::store::results::Key;
+use crate::offline::store::stages::Stages;
+use crate::offline::store::stored::Text;
+use crate::offline::work::Progress;
 use crate::scene::GaussianScene;
 use serde::{Deserialize, Serialize};
 
@@ -43,7 +45,7 @@ pub(super) fn score(
     inputs: &mut Inputs<'_>,
     stages: &mut Stages<'_>,
     scoring: Scoring,
-) -> Result<Option<(Vec<Candidate>, Key)>, OfflineError> {
+) -> Result<Option<(Vec<Candidate>, Key)>, BakeError> {
     let (settings, count) = (inputs.settings, inputs.subject.scene.len());
     let engine = matches!(inputs.engine, Engine::Gpu(_));
     let options = format!("{:?} {:?} {engine}", settings.scoring, settings.score);
@@ -78,13 +80,14 @@ pub(super) fn score(
 /// Name of the stage.
 const SCORE: &str = "score";
 
-/// The stage prune: chooses the score and the count, given the key of the scores. Returns the key of the Gaussians that are kept.
+/// The stage prune: chooses the score and the count, given the key of the scores. Returns the key of the Gaussians that
+/// are kept.
 pub(super) fn choose(
     inputs: &mut Inputs<'_>,
     stages: &mut Stages<'_>,
     scores: &[Candidate],
     scores_key: Key,
-) -> Result<(Choice, Key), OfflineError> {
+) -> Result<(Choice, Key), BakeError> {
     let settings = inputs.settings;
     let options = format!("{:?} {:?} {:?} {:?}", settings.goal, inputs.tunes(), settings.quality, settings.key_frames);
     let key = scores_key.with(inputs.image_keys[1]).and(&options);
@@ -102,11 +105,7 @@ fn trains(inputs: &Inputs<'_>, candidates: &[Candidate], goal: Goal) -> bool {
 }
 
 /// Prunes by each candidate, chooses the best one, and measures the fractions of [`SWEEP`] with it.
-fn search(
-    inputs: &mut Inputs<'_>,
-    candidates: &[Candidate],
-    progress: &mut dyn Progress,
-) -> Result<Choice, OfflineError> {
+fn search(inputs: &mut Inputs<'_>, candidates: &[Candidate], progress: &mut dyn Progress) -> Result<Choice, BakeError> {
     let goal = match (inputs.settings.goal, candidates.first()) {
         (Goal::Size(bytes), Some(first)) => Goal::Keep(count_of_size(inputs, bytes, &first.scores, progress)?),
         (goal, _) => goal,
@@ -131,29 +130,31 @@ fn search(
         outcomes.extend(more.outcomes);
     }
     let summary = search.summary(outcomes);
-    let mut tried = Vec::new();
-    let mut add = |score: &str, count: usize, psnr: f64| {
-        let ratio = 1.0 - count as f64 / total.max(1) as f64;
-        tried.push(Tried { variant: score.to_owned(), ratio, kept: count, psnr });
-    };
-    if let Some(psnr) = summary.psnr_before {
-        add(&best.name, total, psnr);
-    }
-    for outcome in &summary.candidates {
-        for trial in &outcome.trials {
-            add(&outcome.score, trial.count, trial.psnr);
-        }
-    }
+    let mut tried = tried_in(&summary, &best.name, total);
     if let Some(settings) = inputs.tunes().map(short).filter(|_| trains(inputs, candidates, goal)) {
         let images = inputs.images(progress)?;
         let (engine, whole) = (&mut *inputs.engine, &inputs.subject.scene);
         let mut trials = TrainedSearch { engine, images: &images, settings: &settings, whole, search: &search };
         let chosen = trials.best(candidates, goal, (best, kept), progress)?;
-        for (score, Trial { count, psnr }) in chosen.tried {
-            add(&format!("{score}, {} steps", settings.steps), count, psnr);
-        }
+        tried.extend(chosen.tried.into_iter().map(|(score, Trial { count, psnr })| {
+            tried_count(format!("{score}, {} steps", settings.steps), count, total, psnr)
+        }));
         (best, kept) = (chosen.candidate, chosen.kept);
     }
     let compared_with = format!("{}, {}", summary.views, summary.compared_with);
     Ok(Choice { score: best.name, kept, compared_with, tried })
+}
+
+/// Returns the counts that a search has tried, and the whole scene, which all scores keep alike, under the name of the
+/// best score.
+fn tried_in(summary: &SearchSummary, best: &str, total: usize) -> Vec<Tried> {
+    let whole = summary.psnr_before.map(|psnr| tried_count(best.to_owned(), total, total, psnr));
+    let trials = summary.candidates.iter().flat_map(|outcome| outcome.trials.iter().map(move |trial| (outcome, trial)));
+    let trials = trials.map(|(outcome, trial)| tried_count(outcome.score.clone(), trial.count, total, trial.psnr));
+    whole.into_iter().chain(trials).collect()
+}
+
+/// Returns a count of `total` Gaussians as the report shows it.
+fn tried_count(variant: String, kept: usize, total: usize, psnr: f64) -> Tried {
+    Tried { variant, ratio: 1.0 - kept as f64 / total.max(1) as f64, kept, psnr }
 }

@@ -1,19 +1,23 @@
 //! The inputs that the stages of a bake share.
 //!
-//! In: a scene, [`BakeSettings`]. Out: the views of its dataset, divided; the folder of results; the keys of the contents of all inputs.
+//! In: a scene, [`BakeSettings`]. Out: the views of its dataset, divided; the folder of results; the keys of the
+//! contents of all inputs.
 
+use super::BakeError;
 use super::ahead::check;
-use crate::offline::bake_settings::BakeSettings;
-use crate::offline::belonging::require_belonging;
-use crate::offline::convert::require_no_windows;
+use super::job::{Job, Scoring};
+use super::settings::BakeSettings;
 use crate::offline::dataset::TrainingView;
+use crate::offline::dataset::splits::Splits;
+use crate::offline::dataset::trained_pixel;
 use crate::offline::engine::Engine;
-use crate::offline::fine_tune::{FineTuneSettings, ImageRoom, TrainingImages, obstacle};
-use crate::offline::jobs::job::{FOLDER, Job, Scoring};
-use crate::offline::search::Goal;
-use crate::offline::splits::Splits;
-use crate::offline::store::{Key, Store};
-use crate::offline::{OfflineError, Progress, Subject, trained_pixel};
+use crate::offline::forms::Subject;
+use crate::offline::forms::convert::require_no_windows;
+use crate::offline::measure::belonging::require_belonging;
+use crate::offline::prune::search::Goal;
+use crate::offline::store::results::{BAKE_FOLDER, Key, Store};
+use crate::offline::train::{FineTuneSettings, ImageRoom, TrainingImages, untrainable::obstacle};
+use crate::offline::work::Progress;
 use crate::scene::{GaussianScene, MAX_SEGMENTS};
 use std::sync::Arc;
 
@@ -47,11 +51,11 @@ impl<'a> Inputs<'a> {
         job: Option<Job>,
         engine: &'a mut Engine,
         progress: &mut dyn Progress,
-    ) -> Result<Self, OfflineError> {
+    ) -> Result<Self, BakeError> {
         let BakeSettings { checkpoint, data, splits: options, .. } = settings;
         let store = match job {
-            Some(_) => Store::shared(&settings.out, FOLDER)?,
-            None => Store::beside(&settings.out, FOLDER)?,
+            Some(_) => Store::shared(&settings.out, BAKE_FOLDER)?,
+            None => Store::beside(&settings.out, BAKE_FOLDER)?,
         };
         require_no_windows(scene.filter.as_ref(), "a bake")?;
         scene.filter = None;
@@ -69,7 +73,7 @@ impl<'a> Inputs<'a> {
         let mut subject = Subject::new(checkpoint, scene, settings.background)?;
         let pixel = trained_pixel(&subject.scene, &views);
         (subject.scene.trained_with.pixel, subject.runtime.trained_with.pixel) = (pixel, pixel);
-        // Of the jobs of a bake one checks the images.
+        // Of the jobs of a bake, one checks the images.
         let checks = job.is_none_or(|job| job.stage == "score" && !matches!(job.scoring, Scoring::Shard(_)));
         if checks && !settings.trust_images {
             require_belonging(engine, &subject.runtime, &views, subject.background)?;
@@ -82,8 +86,8 @@ impl<'a> Inputs<'a> {
         self.image_keys[0].with(self.image_keys[1])
     }
 
-    /// Returns the images to train and to validate on; loads them on the first call.
-    pub(super) fn images(&mut self, progress: &mut dyn Progress) -> Result<Arc<TrainingImages>, OfflineError> {
+    /// Returns the images to train and to validate on. Loads them on the first call.
+    pub(super) fn images(&mut self, progress: &mut dyn Progress) -> Result<Arc<TrainingImages>, BakeError> {
         if let Some(images) = &self.images {
             return Ok(images.clone());
         }
@@ -98,13 +102,13 @@ impl<'a> Inputs<'a> {
         Ok(self.images.insert(Arc::new(images)).clone())
     }
 
-    /// Returns the settings of training; `None` if the remaining Gaussians are not trained.
+    /// Returns the settings of fine-tuning; `None` if the remaining Gaussians are not trained.
     pub(super) fn tunes(&self) -> Option<&FineTuneSettings> {
         let can = matches!(self.engine, Engine::Gpu(_)) && self.obstacle().is_none();
         self.settings.fine_tune.as_ref().filter(|_| can)
     }
 
-    /// Returns why the stage is left out although the settings contain it; `None` if they do not contain it.
+    /// Returns why fine-tuning is left out; `None` if the settings do not contain it.
     pub(super) fn reason_to_leave_out(&self) -> Option<String> {
         self.settings.fine_tune.as_ref()?;
         let software = "it needs a GPU; --engine gpu takes one with a software driver, slowly".to_owned();
@@ -121,7 +125,7 @@ impl<'a> Inputs<'a> {
         key_frames(self.settings, &self.views)
     }
 
-    /// Returns the most bytes that the package may have.
+    /// Returns the largest number of bytes that the package may have.
     pub(super) fn limit(&self) -> u64 {
         match self.settings.goal {
             Goal::Size(limit) => limit,

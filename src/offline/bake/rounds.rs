@@ -1,22 +1,24 @@
 //! The stage rounds of a bake: gradual pruning.
 //!
-//! In: the scores of all Gaussians, the Gaussians to keep. Out: the scene with that number of Gaussians. Each of several rounds removes the
-//! same fraction of the remaining Gaussians, trains the rest for a while, and scores it again: the score of a Gaussian depends on which
-//! other Gaussians remain.
+//! In: the scores of all Gaussians, the Gaussians to keep. Out: the scene with that number of Gaussians. Each of
+//! several rounds removes the same fraction of the remaining Gaussians, trains the rest for a while, and scores it
+//! again: the score of a Gaussian depends on which other Gaussians remain.
 
+use super::BakeError;
 use super::inputs::Inputs;
 use super::tuning::short;
 use crate::offline::engine::Engine;
-use crate::offline::fine_tune::fine_tune;
-use crate::offline::prune::{highest, select};
+use crate::offline::forms::Subject;
+use crate::offline::prune::select::{highest, select};
 use crate::offline::score::Variant;
-use crate::offline::stages::Stages;
-use crate::offline::store::Key;
-use crate::offline::{OfflineError, Progress, Subject};
+use crate::offline::store::results::Key;
+use crate::offline::store::stages::Stages;
+use crate::offline::train::fine_tune;
+use crate::offline::work::Progress;
 use crate::scene::GaussianScene;
 
-/// Removes Gaussians in rounds, or all at once if there is one round or nothing is trained. Returns the scene and its key, given the
-/// key of the choice.
+/// Removes Gaussians in rounds, or all at once if there is one round or nothing is trained. Returns the scene and its
+/// key, given the key of the choice.
 pub(super) fn thin(
     inputs: &mut Inputs<'_>,
     stages: &mut Stages<'_>,
@@ -24,7 +26,7 @@ pub(super) fn thin(
     score: &str,
     kept: &[u32],
     choice: Key,
-) -> Result<(GaussianScene, Key), OfflineError> {
+) -> Result<(GaussianScene, Key), BakeError> {
     let rounds = inputs.settings.rounds;
     let key = choice.with(inputs.scene_key).and(&format!("{} Gaussians", kept.len()));
     match (inputs.tunes().filter(|_| rounds > 1), score.parse::<Variant>()) {
@@ -50,7 +52,7 @@ fn remove_in_rounds(
     variant: Variant,
     keep: usize,
     progress: &mut dyn Progress,
-) -> Result<GaussianScene, OfflineError> {
+) -> Result<GaussianScene, BakeError> {
     let counts = counts(inputs.subject.scene.len(), keep, inputs.settings.rounds);
     let mut scene = select(&inputs.subject.scene, &highest(scores, counts[0]));
     let images = inputs.images(progress)?;
@@ -67,7 +69,8 @@ fn remove_in_rounds(
     Ok(scene)
 }
 
-/// Returns how many Gaussians remain after each round: the same fraction of the previous number, and `keep` after the last round.
+/// Returns how many Gaussians remain after each round: the same fraction of the previous number, and `keep` after the
+/// last round.
 fn counts(total: usize, keep: usize, rounds: usize) -> Vec<usize> {
     let fraction = keep as f64 / total.max(1) as f64;
     let left = |round: usize| (total as f64 * fraction.powf(round as f64 / rounds as f64)).round() as usize;

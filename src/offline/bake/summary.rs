@@ -3,18 +3,18 @@
 //! In: the Gaussians before and after, the package, the choices, the test views. Out: the [`BakeReport`].
 
 use super::choice::Choice;
+use super::settings::BakeSettings;
+use super::test_comparison::Compared;
 use super::tuning::Tuning;
 use crate::codec::package;
 use crate::gaussian::Gaussian;
-use crate::offline::OfflineError;
-use crate::offline::bake_settings::BakeSettings;
-use crate::offline::quantize::{Quality, broken_promises};
+use crate::offline::compress::{Quality, broken_promises};
+use crate::offline::filter::temporal_filter::filter_name;
+use crate::offline::prune::search::Goal;
 use crate::offline::report::{
     Activity, BakeReport, Change, SectionSize, StageTime, VarianceHistogram, even_times, filter_shares,
 };
-use crate::offline::search::Goal;
-use crate::offline::temporal_filter::filter_name;
-use crate::offline::test_comparison::Compared;
+use crate::offline::work::FileError;
 use crate::scene::{Form, SceneForm, TemporalFilter, TrainedWith};
 use std::fs;
 use std::io::Cursor;
@@ -41,12 +41,12 @@ impl Facts<'_> {
     ///
     /// # Errors
     /// The package cannot be read back, the checkpoint has been removed.
-    pub(super) fn report(self) -> Result<BakeReport, OfflineError> {
+    pub(super) fn report(self) -> Result<BakeReport, FileError> {
         let BakeSettings { checkpoint, data, out, .. } = self.settings;
         let (interval, cutoff) = (self.trained_with.time_interval, self.trained_with.marginal_cutoff);
         let times = even_times(interval, TIMES);
-        let info = package::inspect(Cursor::new(self.package)).map_err(|error| OfflineError::at(out, error))?;
-        let original = fs::metadata(checkpoint).map_err(|error| OfflineError::at(checkpoint, error))?;
+        let info = package::inspect(Cursor::new(self.package)).map_err(|error| FileError::at(out, error))?;
+        let original = fs::metadata(checkpoint).map_err(|error| FileError::at(checkpoint, error))?;
         let (choices, warnings) = (self.choices(), self.warnings()?);
         let (split, evaluation, samples) = match self.compared {
             Some(compared) => (Some(compared.split.to_owned()), Some(compared.evaluation), compared.samples),
@@ -78,11 +78,11 @@ impl Facts<'_> {
         })
     }
 
-    /// Returns what the quality promises and the package does not keep. Its pictures are compared with the images of the test views, not with those
-    /// of the checkpoint.
-    fn warnings(&self) -> Result<Vec<String>, OfflineError> {
+    /// Returns what the quality promises and the package does not keep. Its pictures are compared with the images of
+    /// the test views, not with those of the checkpoint.
+    fn warnings(&self) -> Result<Vec<String>, FileError> {
         let scene = package::read(Cursor::new(self.package));
-        match scene.map_err(|error| OfflineError::at(&self.settings.out, error))?.form {
+        match scene.map_err(|error| FileError::at(&self.settings.out, error))?.form {
             SceneForm::Ready(Form::Packed(packed)) => Ok(broken_promises(self.settings.quality, &packed, None)),
             SceneForm::Ready(Form::Sliced(_)) | SceneForm::Trained(_) => Ok(Vec::new()),
         }

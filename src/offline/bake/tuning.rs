@@ -1,16 +1,17 @@
 //! The stage fine-tune of a bake.
 //!
-//! In: the remaining Gaussians, the images to train and to validate on. Out: the Gaussians after training, and their quality at each
-//! evaluation ([`Tuning`]).
+//! In: the remaining Gaussians, the images to train and to validate on. Out: the Gaussians after training, and their
+//! quality at each evaluation ([`Tuning`]).
 
+use super::BakeError;
 use super::inputs::Inputs;
+use crate::offline::compress::CompressSettings;
 use crate::offline::engine::Engine;
-use crate::offline::fine_tune::{CurvePoint, FineTuneSettings, Resume, fine_tune as train};
-use crate::offline::quantize::CompressSettings;
-use crate::offline::stages::Stages;
-use crate::offline::store::Key;
-use crate::offline::stored::Text;
-use crate::offline::{OfflineError, Progress};
+use crate::offline::store::results::Key;
+use crate::offline::store::stages::Stages;
+use crate::offline::store::stored::Text;
+use crate::offline::train::{self, CurvePoint, FineTuneSettings, Resume, TrainError};
+use crate::offline::work::Progress;
 use crate::scene::GaussianScene;
 use serde::{Deserialize, Serialize};
 
@@ -34,14 +35,14 @@ pub(super) fn short(settings: &FineTuneSettings) -> FineTuneSettings {
     FineTuneSettings { steps, evaluate_every: steps.max(1), compress: None, ..settings.clone() }
 }
 
-/// The stage fine-tune: trains the remaining Gaussians. Returns the Gaussians and their key; if the stage
-/// is left out, unchanged Gaussians and no tuning.
+/// The stage fine-tune: trains the remaining Gaussians. Returns the Gaussians and their key; if the stage is left out,
+/// unchanged Gaussians and no tuning.
 pub(super) fn fine_tune(
     inputs: &mut Inputs<'_>,
     stages: &mut Stages<'_>,
     scene: GaussianScene,
     key: Key,
-) -> Result<(GaussianScene, Option<Tuning>, Key), OfflineError> {
+) -> Result<(GaussianScene, Option<Tuning>, Key), BakeError> {
     let Some(tuning) = inputs.tunes().cloned() else {
         stages.leave_out("fine-tune", inputs.reason_to_leave_out().as_deref());
         return Ok((scene, None, key));
@@ -51,11 +52,11 @@ pub(super) fn fine_tune(
         "fine-tune",
         key,
         |_| true,
-        |progress| {
+        |progress| -> Result<_, BakeError> {
             let images = inputs.images(progress)?;
-            let Engine::Gpu(headless) = &mut *inputs.engine else { return Err(OfflineError::NotTrained) };
+            let Engine::Gpu(headless) = &mut *inputs.engine else { return Err(TrainError::WithoutGpu.into()) };
             let resume = Resume { store: &inputs.store, key, every: tuning.evaluate_every };
-            let tuned = train(headless, scene, &images, &tuning, Some(resume), progress)?;
+            let tuned = train::fine_tune(headless, scene, &images, &tuning, Some(resume), progress)?;
             let tuning = Tuning { curve: tuned.curve, best: tuned.best, validation: tuned.validation };
             Ok((Text(tuning), tuned.scene))
         },
@@ -63,13 +64,14 @@ pub(super) fn fine_tune(
     Ok((scene, Some(tuning), key))
 }
 
-/// Trains the codebooks of a fine-tuned scene and compresses it; returns the scene unchanged if the quality has no codebooks.
+/// Trains the codebooks of a fine-tuned scene and compresses it; returns the scene unchanged if the quality has no
+/// codebooks.
 pub(super) fn with_codebooks(
     inputs: &mut Inputs<'_>,
     scene: GaussianScene,
     key: Key,
     progress: &mut dyn Progress,
-) -> Result<GaussianScene, OfflineError> {
+) -> Result<GaussianScene, BakeError> {
     let quality = inputs.settings.quality;
     let Some(tuning) = inputs.tunes().filter(|_| !CompressSettings::from(quality).codebooks.is_empty()).cloned() else {
         return Ok(scene);
@@ -79,5 +81,5 @@ pub(super) fn with_codebooks(
     let compress = Some((quality, tuning.steps / CODING));
     let coding = FineTuneSettings { steps: 0, compress, ..tuning };
     let resume = Resume { store: &inputs.store, key, every: coding.evaluate_every };
-    Ok(train(headless, scene, &images, &coding, Some(resume), progress)?.scene)
+    Ok(train::fine_tune(headless, scene, &images, &coding, Some(resume), progress)?.scene)
 }

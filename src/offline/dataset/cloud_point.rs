@@ -1,6 +1,6 @@
 //! A point that a training may begin with.
 //!
-//! In: what a file says of it, in double precision. Out: [`CloudPoint`], counted from an origin.
+//! In: its place, color and time in a file, in double precision. Out: a [`CloudPoint`], counted from an origin.
 
 use crate::scene::Origin;
 use glam::{DVec3, Vec3};
@@ -18,7 +18,7 @@ pub struct CloudPoint {
 
 impl CloudPoint {
     /// Returns a point with this place and time of a file.
-    pub(super) fn counted_from(origin: &Origin, place: [f64; 3], color: Option<Vec3>, time: Option<f64>) -> Self {
+    pub(crate) fn counted_from(origin: &Origin, place: [f64; 3], color: Option<Vec3>, time: Option<f64>) -> Self {
         Self {
             position: (DVec3::from(place) - DVec3::from(origin.place)).as_vec3(),
             color,

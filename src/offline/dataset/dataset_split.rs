@@ -2,27 +2,26 @@
 //!
 //! In: a folder and a split. Out: the [`TrainingView`]s of the split in file order; an error if images are missing.
 
-use super::camera_file::CameraFile;
-use super::camera_options::{CameraOptions, check_size};
-use super::clock::Clock;
+use super::cameras::camera_options::{CameraOptions, check_size};
+use super::cameras::clock::Clock;
+use super::cameras::origin;
+use super::cameras::placing::Placed;
 use super::division::divide;
 use super::error::DatasetError;
-use super::files::require_files;
 use super::format::{self, Format, Reader};
-use super::origin;
-use super::placing::Placed;
-use super::point_cloud::BESIDE;
+use super::formats::camera_file::CameraFile;
+use super::formats::files::{points_beside, require_files};
+use super::formats::video::Videos;
 use super::split::Split;
-use super::video::Videos;
 use super::view::TrainingView;
-use crate::offline::{NoProgress, Progress};
+use crate::offline::work::{NoProgress, Progress};
 use crate::scene::Origin;
 use std::mem::take;
 use std::path::{Path, PathBuf};
 
 /// The note about the test views of the scene `lego`.
-const LEGO: &str = "its test views are those of transforms_val.json, not of transforms_test.json, as in the original for folders whose name ends in lego: \
-                    rename the folder if it is another scene";
+const LEGO: &str = "its test views are those of transforms_val.json, not of transforms_test.json, as in the original \
+                    for folders whose name ends in lego: rename the folder if it is another scene";
 
 /// One split of a dataset folder.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,28 +34,31 @@ pub struct Dataset {
     pub views: Vec<TrainingView>,
     /// File of points to begin training with, if the dataset names or has one. It may not exist.
     pub points: Option<PathBuf>,
-    /// What was assumed or left out when the folder was read, a sentence each.
+    /// Assumptions and omissions of reading the folder, a sentence each.
     pub notes: Vec<String>,
-    /// The origin of the views in the coordinates of the files, the same for all splits: places and times of views are counted from it.
+    /// The origin of the views in the coordinates of the files, the same for all splits: places and times of views are
+    /// counted from it.
     pub origin: Origin,
-    /// What the times of the views mean.
+    /// The meaning of the times of the views.
     pub(crate) clock: Clock,
 }
 
 impl Dataset {
-    /// Reads the cameras of one split of a folder of any format. The frames of videos are decoded once, by the program `ffmpeg`.
+    /// Reads the cameras of one split of a folder of any format. The frames of videos are decoded once, by the program
+    /// `ffmpeg`.
     ///
     /// # Errors
-    /// [`DatasetError`] if the folder has no such split, or its files are unusable. Missing images are not an error here.
+    /// [`DatasetError`] if the folder has no such split, or its files are unusable. Missing images are not an error
+    /// here.
     pub fn open(folder: &Path, split: Split, options: &CameraOptions) -> Result<Self, DatasetError> {
-        Self::open_telling(folder, split, options, &mut NoProgress)
+        Self::open_with_progress(folder, split, options, &mut NoProgress)
     }
 
-    /// Reads as [`open`](Self::open). Begins the task "decoding" for each video that is decoded.
+    /// Reads as [`open`](Self::open), with notes about the videos that are decoded.
     ///
     /// # Errors
     /// As [`open`](Self::open).
-    pub(crate) fn open_telling(
+    pub(crate) fn open_with_progress(
         folder: &Path,
         split: Split,
         options: &CameraOptions,
@@ -69,7 +71,7 @@ impl Dataset {
     ///
     /// # Errors
     /// As [`open`](Self::open).
-    pub(crate) fn look(folder: &Path, split: Split, options: &CameraOptions) -> Result<Self, DatasetError> {
+    pub(crate) fn open_undecoded(folder: &Path, split: Split, options: &CameraOptions) -> Result<Self, DatasetError> {
         Self::open_as(folder, split, options, Videos::Leave)
     }
 
@@ -107,7 +109,7 @@ impl Dataset {
         if !path.is_file() {
             return Err(DatasetError::NoSplit { folder: folder.to_owned(), file: split.file_name() });
         }
-        let points = Some(folder.join(BESIDE)).filter(|points| points.is_file());
+        let points = points_beside(folder);
         let file = CameraFile::read(&path)?;
         let origin = options.origin.or(file.common_origin(folder, split, options.is_static)?);
         let Placed { views, origin, mut notes } = file.views(&CameraOptions { origin, ..*options })?;
@@ -119,7 +121,7 @@ impl Dataset {
     pub(crate) fn has(folder: &Path, split: Split) -> bool {
         match format::of(folder).map(|format| &format.reader) {
             Some(Reader::Splits) => folder.join(split.file_name()).is_file(),
-            Some(Reader::Whole(_)) => Self::look(folder, split, &CameraOptions::default()).is_ok(),
+            Some(Reader::Whole(_)) => Self::open_undecoded(folder, split, &CameraOptions::default()).is_ok(),
             None => false,
         }
     }
@@ -129,7 +131,7 @@ impl Dataset {
         format::of(folder).map(|format| format.name)
     }
 
-    /// Reports what was assumed or left out, a note each.
+    /// Reports assumptions and omissions, a note each.
     pub(crate) fn note(&self, progress: &mut dyn Progress) {
         self.notes.iter().for_each(|note| progress.note(&format!("note: {}: {note}", self.folder.display())));
     }

@@ -1,10 +1,10 @@
 //! Splits of datasets whose views are in one file.
 //!
-//! In: all views of a folder. Out: the views of one split. Without splits in the dataset, every eighth camera is for the test, the first one
-//! included; if there is one camera, every eighth view.
+//! In: all views of a folder. Out: the views of one split. Without splits in the dataset, every eighth camera is for
+//! the test, the first one included; if there is one camera, every eighth view.
 
+use super::formats::undivided::Undivided;
 use super::selection::{distinct_cameras, distinct_times, identity};
-use super::undivided::Undivided;
 use super::{CameraOptions, DatasetError, Split, TrainingView};
 use crate::view::Camera;
 use std::collections::HashSet;

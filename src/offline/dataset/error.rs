@@ -9,11 +9,13 @@ use std::{fmt, io};
 
 use glam::UVec2;
 
-use super::{MAX_SIDE, Split};
+use super::{MAX_SIDE, Split, Validation};
 use crate::offline::picture_file::PictureError;
+use crate::offline::work::Interrupted;
 
 /// A dataset, a camera file or an image that cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum DatasetError {
     /// The folder has no camera file.
     #[error(
@@ -29,7 +31,10 @@ pub enum DatasetError {
         formats: String,
     },
     /// The folder has camera files of other splits alone.
-    #[error("{}: no {file} in it, which holds the cameras of this split: add it, or choose another split", .folder.display())]
+    #[error(
+        "{}: no {file} in it, which holds the cameras of this split: add it, or choose another split",
+        .folder.display()
+    )]
     NoSplit {
         /// The folder.
         folder: PathBuf,
@@ -69,7 +74,8 @@ pub enum DatasetError {
     },
     /// Every frame lies outside the time interval.
     #[error(
-        "{}: all frames lie outside the time interval {},{}: their times are {} to {}{}; pass the interval the capture was trained with",
+        "{}: all frames lie outside the time interval {},{}: their times are {} to {}{}; pass the interval the capture \
+         was trained with",
         .path.display(), .interval[0], .interval[1], .times[0], .times[1], Counted(*.origin)
     )]
     NoFramesInInterval {
@@ -109,8 +115,8 @@ pub enum DatasetError {
     },
     /// The requested resolution gives a picture size that is out of range.
     #[error(
-        "resolution {resolution} cannot be used on {}x{} pixels: it is a divisor (1, 2, 3, 4 or 8), -1 (at most 1600 wide) or a target \
-         width up to {MAX_SIDE}",
+        "resolution {resolution} cannot be used on {}x{} pixels: it is a divisor (1, 2, 3, 4 or 8), -1 (at most 1600 \
+         wide) or a target width up to {MAX_SIDE}",
         .original.x, .original.y
     )]
     Resolution {
@@ -131,8 +137,8 @@ pub enum DatasetError {
     },
     /// An image or a mask has another shape than the pictures of the camera file, so that it would be stretched.
     #[error(
-        "{}: {} x {} pixels do not have the aspect ratio of the pictures of the camera file, {} x {}: crop it to that aspect ratio, or \
-         correct the size in the camera file (without one, it is that of the first image)",
+        "{}: {} x {} pixels do not have the aspect ratio of the pictures of the camera file, {} x {}: crop it to that \
+         aspect ratio, or correct the size in the camera file (without one, it is that of the first image)",
         .path.display(), .size.x, .size.y, .expected.x, .expected.y
     )]
     Aspect {
@@ -143,9 +149,6 @@ pub enum DatasetError {
         /// Width and height according to the camera file, pixels.
         expected: UVec2,
     },
-    /// The user has requested an early end while videos were decoded.
-    #[error("interrupted")]
-    Interrupted,
     /// A file of a dataset, or a video, cannot be used.
     #[error("{}: {reason}", .path.display())]
     Unusable {
@@ -162,7 +165,8 @@ pub enum DatasetError {
     },
     /// All views are taken from one place.
     #[error(
-        "{}: all {views} views are taken from the same place, so that no depth can be found: the poses are missing, or belong to another scene",
+        "{}: all {views} views are taken from the same place, so that no depth can be found: the poses are missing, or \
+         belong to another scene",
         .path.display()
     )]
     SamePlace {
@@ -172,7 +176,11 @@ pub enum DatasetError {
         views: usize,
     },
     /// A dataset has no views for a split.
-    #[error("{}: it has no views of the split {split:?}: list some, or remove its splits, so that every eighth camera is for the test", .path.display())]
+    #[error(
+        "{}: it has no views of the split {split:?}: list some, or remove its splits, so that every eighth camera is \
+         for the test",
+        .path.display()
+    )]
     EmptySplit {
         /// The camera file.
         path: PathBuf,
@@ -187,13 +195,28 @@ pub enum DatasetError {
         /// The folder of all frames that were decoded from the videos of the dataset.
         folder: PathBuf,
     },
+    /// The views of a dataset cannot be divided into training and validation views in the requested way.
+    #[error(
+        "{}: does not allow validation by {validation}: it has too few cameras or times, or no split val of its own",
+        .folder.display()
+    )]
+    NoValidation {
+        /// The dataset.
+        folder: PathBuf,
+        /// The requested way.
+        validation: Validation,
+    },
     /// An image cannot be decoded, or is larger than the camera file says.
-    #[error(transparent)]
+    #[error("{0}")]
     Image(#[from] PictureError),
+    /// The user has interrupted the work.
+    #[error("{0}")]
+    Interrupted(#[from] Interrupted),
 }
 
 /// The fault of one frame of a camera file.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum FrameProblem {
     /// An entry is missing or has the wrong type.
     #[error("{0}")]
@@ -206,7 +229,8 @@ pub enum FrameProblem {
     Time(f64),
     /// A frame has no time, and others have one.
     #[error(
-        "\"{0}\" has no \"time\", and other frames of the dataset have one: add the time, or remove those of all frames (--static reads every frame at time 0)"
+        "\"{0}\" has no \"time\", and other frames of the dataset have one: add the time, or remove those of all \
+         frames"
     )]
     NoTime(String),
     /// The camera's matrix is not a pose.
@@ -214,7 +238,8 @@ pub enum FrameProblem {
     Matrix(Cow<'static, str>),
     /// The camera's matrix has another scale than those of other frames.
     #[error(
-        "the axes of the camera have the length {found}, and those of most cameras {usual}: write rotations without a scale, or with one scale for all"
+        "the axes of the camera have the length {found}, and those of most cameras {usual}: write rotations without a \
+         scale, or with one scale for all"
     )]
     Scale {
         /// Length of the axes in units of the world.
@@ -223,7 +248,9 @@ pub enum FrameProblem {
         usual: f64,
     },
     /// Neither intrinsics nor a field of view.
-    #[error("no lens: give camera_angle_x, or all of fl_x, fl_y, cx and cy, for the frame or the whole file")]
+    #[error(
+        "no lens: give camera_angle_x, all of fl_x, fl_y, cx and cy, or a matrix K, for the frame or the whole file"
+    )]
     NoLens,
     /// The horizontal field of view is out of range.
     #[error("camera_angle_x is {0}: it must lie between 0 and π (radians)")]
@@ -233,7 +260,8 @@ pub enum FrameProblem {
     Lens,
     /// An entry describes the picture of a camera that is not a pinhole camera.
     #[error(
-        "{entry} is not 0 but {value}, and a distorted picture cannot be used: {UNDISTORT}; then remove {entry}, or set it to 0"
+        "{entry} is not 0 but {value}, and a distorted picture cannot be used: {UNDISTORT}; then remove {entry}, or \
+         set it to 0"
     )]
     Distorted {
         /// Name of the entry.
@@ -243,20 +271,27 @@ pub enum FrameProblem {
     },
     /// The distortion cannot be undone.
     #[error(
-        "the distortion k1, k2, k3, k4, p1, p2 folds the picture, or needs more than twice the focal length, and cannot be undone: {UNDISTORT}, \
-         or correct the coefficients"
+        "the distortion k1, k2, k3, k4, p1, p2 folds the picture, or needs more than twice the focal length, and \
+         cannot be undone: {UNDISTORT}, or correct the coefficients"
     )]
     Folded,
+    /// The distortion has coefficients, of which so many are given, that cannot be undone.
+    #[error(
+        "its {0} coefficients of distortion cannot be undone, of which only k1, k2, p1, p2, k3, k4, k5 and k6 of \
+         OpenCV can: {UNDISTORT}; then write five zeros"
+    )]
+    Coefficients(usize),
     /// The distortion of the camera model cannot be undone.
     #[error(
-        "camera_model is \"{0}\", whose distortion cannot be undone (PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV and OPENCV_FISHEYE can, of \
-         COLMAP also SIMPLE_PINHOLE, FULL_OPENCV, FISHEYE, SIMPLE_FISHEYE, RADIAL_FISHEYE and SIMPLE_RADIAL_FISHEYE): {UNDISTORT}; then write PINHOLE"
+        "camera_model is \"{0}\", whose distortion cannot be undone (PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV and \
+         OPENCV_FISHEYE can, of COLMAP also SIMPLE_PINHOLE, FULL_OPENCV, FISHEYE, SIMPLE_FISHEYE, RADIAL_FISHEYE and \
+         SIMPLE_RADIAL_FISHEYE): {UNDISTORT}; then write PINHOLE"
     )]
     CameraModel(String),
     /// The principal point of a golden view is not the center of the picture.
     #[error(
-        "{entry} is {found}, and golden views have their principal point at the center, {center}: write the views as a transforms file, \
-         whose fl_x, fl_y, cx and cy are used"
+        "{entry} is {found}, and golden views have their principal point at the center, {center}: write the views as a \
+         transforms file, whose fl_x, fl_y, cx and cy are used"
     )]
     PrincipalPoint {
         /// Name of the entry: `cx` or `cy`.
@@ -268,8 +303,8 @@ pub enum FrameProblem {
     },
     /// A number that follows from the lens and the pose is not finite.
     #[error(
-        "the projection of camera {0:?} is not finite: check its focal lengths and principal point, or its field of view, \
-         and its matrix"
+        "the projection of camera {0:?} is not finite: check its focal lengths and principal point, or its field of \
+         view, and its matrix"
     )]
     Projection(String),
     /// The picture size is out of range.

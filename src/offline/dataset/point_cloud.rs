@@ -1,22 +1,20 @@
 //! Points to begin a training with.
 //!
-//! In: a file of points: PLY (`x`, `y`, `z`, optionally `red`, `green`, `blue` and `time`), or COLMAP's `points3D.bin` and `points3D.txt`; the origin
-//! of the views. Out: a [`PointCloud`]. Points whose place or time is not finite are left out. No count of a file is trusted before as many bytes are
-//! there.
+//! In: a file of points: PLY (`x`, `y`, `z`, optionally `red`, `green`, `blue` and `time`), COLMAP's `points3D.bin` and
+//! `points3D.txt`, `points.npy` of Nerfies, or `init_pt_cld.npz` of `PanopticSports`; the origin of the views. Out: a
+//! [`PointCloud`]. Points whose place or time is not finite are left out. A count in a file is used only if the file
+//! has as many bytes.
 
 pub use super::cloud_point::CloudPoint;
 
-use super::DatasetError;
-use super::colmap;
 use crate::codec::import::ply::is_ply;
 use crate::codec::import::ply::read::vertices;
+use crate::offline::dataset::DatasetError;
+use crate::offline::dataset::formats::{colmap, nerfies, panoptic};
 use crate::scene::Origin;
 use glam::Vec3;
 use std::fs;
 use std::path::Path;
-
-/// The name of the file beside `transforms_train.json` that the original begins with.
-pub(super) const BESIDE: &str = "points3d.ply";
 
 /// Points, possibly none.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,10 +26,12 @@ impl PointCloud {
     /// # Errors
     /// A file that cannot be read, that is damaged or of another kind.
     pub fn load(path: &Path, origin: &Origin) -> Result<Self, DatasetError> {
-        let has = |ending: &str| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(ending));
-        let mut points = match (has("bin"), has("txt")) {
-            (true, _) => colmap::binary_points(path, origin)?,
-            (_, true) => colmap::text_points(path, origin)?,
+        let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+        let mut points = match extension.to_str() {
+            Some("bin") => colmap::binary_points(path, origin)?,
+            Some("txt") => colmap::text_points(path, origin)?,
+            Some("npy") => nerfies::points(path, origin)?,
+            Some("npz") => panoptic::points(path, origin)?,
             _ => ply(path, origin)?,
         };
         points.retain(|point| point.position.is_finite() && point.time.is_none_or(f32::is_finite));
@@ -43,7 +43,9 @@ impl PointCloud {
 fn ply(path: &Path, origin: &Origin) -> Result<Vec<CloudPoint>, DatasetError> {
     let bytes = fs::read(path).map_err(|reason| DatasetError::Read { path: path.to_owned(), reason })?;
     if !is_ply(&bytes) {
-        return Err(unusable(path, "it is no file of points: PLY and COLMAP's points3D.bin and points3D.txt are read"));
+        let known = "PLY, points3D.bin and points3D.txt of COLMAP, points.npy of Nerfies and init_pt_cld.npz of \
+                     PanopticSports";
+        return Err(unusable(path, &format!("it is no file of points: {known} are read")));
     }
     let faulty = |error: crate::codec::import::ImportError| unusable(path, &error.to_string());
     let table = vertices(&bytes).map_err(faulty)?;

@@ -1,7 +1,7 @@
 //! Selecting training views.
 //!
-//! In: the training views of a dataset. Out: an even subset of the views, their distinct cameras, the camera of each view, the
-//! number of their distinct times.
+//! In: the training views of a dataset. Out: an even subset of the views, their distinct cameras, the camera of each
+//! view, the number of their distinct times.
 
 use super::TrainingView;
 use crate::view::{Camera, Lens, Optics, View};
@@ -31,8 +31,8 @@ pub fn even_subset(views: &[TrainingView], wanted: usize) -> Vec<usize> {
     subset
 }
 
-/// Returns the indices of all views of evenly chosen moments, ascending: at most `wanted` views. If a moment has more, returns an even subset of
-/// all views.
+/// Returns the indices of all views of evenly chosen moments, ascending: at most `wanted` views. If a moment has more,
+/// returns an even subset of all views.
 pub fn even_moments(views: &[TrainingView], wanted: usize) -> Vec<usize> {
     if wanted >= views.len() {
         return (0..views.len()).collect();

@@ -28,8 +28,9 @@ impl Split {
         }
     }
 
-    /// Returns the split that the original reads for this one: folders whose name ends in `lego` are evaluated on `val`, if its file is there.
-    pub(in crate::offline) fn resolved(self, folder: &Path) -> Self {
+    /// Returns the split that the original reads for this one: folders whose name ends in `lego` are evaluated on
+    /// `val`, if its file is there.
+    pub(crate) fn resolved(self, folder: &Path) -> Self {
         let is_lego = folder.file_name().is_some_and(|name| name.as_encoded_bytes().ends_with(b"lego"));
         let is_val = self == Self::Test && is_lego && folder.join(Self::Val.file_name()).is_file();
         if is_val { Self::Val } else { self }

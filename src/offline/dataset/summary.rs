@@ -1,10 +1,11 @@
-//! What a dataset folder holds, for people and programs.
+//! A summary of a dataset folder.
 //!
-//! In: a folder, how it is read. Out: its format, its splits with cameras, times and sizes, what is missing, and what was assumed. No image and no
-//! video is decoded, except for the size of one image where the camera files have no size.
+//! In: a folder, how it is read. Out: its format, its splits with cameras, times and sizes, missing files, and
+//! assumptions. No image and no video is decoded, except for the size of one image where the camera files have no size.
 
 use super::dataset_split::not_a_dataset;
 use super::error::LOOKED_FOR;
+use super::formats::numbered::is_video;
 use super::selection::distinct_cameras;
 use super::{CameraOptions, Dataset, DatasetError, Split, TrainingView};
 use crate::view::Camera;
@@ -15,7 +16,7 @@ use std::path::{Path, PathBuf};
 /// Most files that a message names.
 const NAMED: usize = 3;
 
-/// What a dataset folder holds.
+/// The contents of a dataset folder.
 pub struct Summary {
     /// Name of the format.
     pub format: &'static str,
@@ -33,9 +34,9 @@ pub struct Summary {
     pub masks: usize,
     /// File of points to begin training with.
     pub points: Option<PathBuf>,
-    /// What is missing or unusual, a sentence each.
+    /// Missing files and unusual properties, a sentence each.
     pub missing: Vec<String>,
-    /// What was assumed or left out, a sentence each.
+    /// Assumptions and omissions, a sentence each.
     pub notes: Vec<String>,
 }
 
@@ -61,19 +62,14 @@ impl Summary {
         let (mut splits, mut views, mut missing, mut points) = (Vec::new(), Vec::new(), Vec::new(), None);
         let (mut failed, mut notes): (_, Vec<String>) = (None, Vec::new());
         for split in Split::ALL {
-            let found = Dataset::look(folder, split, options);
-            let said = found.iter().flat_map(|dataset| &dataset.notes);
-            let new: Vec<String> = said.filter(|note| !notes.contains(note)).cloned().collect();
+            let found = Dataset::open_undecoded(folder, split, options);
+            let of_split = found.iter().flat_map(|dataset| &dataset.notes);
+            let new: Vec<String> = of_split.filter(|note| !notes.contains(note)).cloned().collect();
             notes.extend(new);
             match found {
                 // The test split of a folder may be its validation split.
                 Ok(dataset) if dataset.split == split => {
-                    splits.push(SplitSummary {
-                        split,
-                        views: dataset.views.len(),
-                        cameras: distinct_cameras(&dataset.views).len(),
-                        times: times(&dataset.views).len(),
-                    });
+                    splits.push(SplitSummary::of(&dataset));
                     views.extend(dataset.views);
                     points = points.or(dataset.points);
                 }
@@ -88,23 +84,9 @@ impl Summary {
         if let Some(error) = failed.filter(|_| views.is_empty()) {
             return Err(error);
         }
-        missing.extend(absent(&views));
-        missing.extend(
-            points
-                .iter()
-                .filter(|path| !path.is_file())
-                .map(|path| format!("{}: no such file of points", path.display())),
-        );
-        let all = times(&views);
+        let (all, cameras) = (times(&views), distinct_cameras(&views));
+        missing.extend(unusual(&views, points.as_deref(), all.len(), cameras.len()));
         let interval = [all.first(), all.last()].map(|time| time.map_or(0.0, |bits| from_order(*bits)));
-        let cameras = distinct_cameras(&views);
-        // The times of videos that have not been decoded are not known.
-        if all.len() < 2 && !views.iter().any(|view| is_video(&view.image)) {
-            missing.push("all views have one time: the scene is static".to_owned());
-        }
-        if cameras.len() < 2 {
-            missing.push("all views have one camera, from which no depth can be found".to_owned());
-        }
         let mut seen = HashSet::new();
         let sizes = views.iter().map(|view| view.camera.size).filter(|size| seen.insert(*size)).collect();
         Ok(Self {
@@ -120,6 +102,31 @@ impl Summary {
             notes,
         })
     }
+}
+
+impl SplitSummary {
+    /// Describes an opened split.
+    fn of(dataset: &Dataset) -> Self {
+        let Dataset { split, views, .. } = dataset;
+        let (cameras, times) = (distinct_cameras(views).len(), times(views).len());
+        Self { split: *split, views: views.len(), cameras, times }
+    }
+}
+
+/// Returns missing files and unusual properties of the views and the file of points, a sentence each. `times` and
+/// `cameras` are numbers of distinct ones.
+fn unusual(views: &[TrainingView], points: Option<&Path>, times: usize, cameras: usize) -> Vec<String> {
+    let mut sentences = absent(views);
+    let no_points = points.filter(|path| !path.is_file());
+    sentences.extend(no_points.map(|path| format!("{}: no such file of points", path.display())));
+    // The times of videos that have not been decoded are not known.
+    if times < 2 && !views.iter().any(|view| is_video(&view.image)) {
+        sentences.push("all views have one time: the scene is static".to_owned());
+    }
+    if cameras < 2 {
+        sentences.push("all views have one camera, from which no depth can be found".to_owned());
+    }
+    sentences
 }
 
 /// Returns the distinct times, ascending, as integers of the same order.
@@ -138,11 +145,6 @@ fn from_order(order: i32) -> f32 {
     f32::from_bits(bits.cast_unsigned())
 }
 
-/// Returns whether a path is that of a video, which has not been decoded.
-fn is_video(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mp4"))
-}
-
 /// Returns a sentence for the images, masks and decoded videos that are not on disk.
 fn absent(views: &[TrainingView]) -> Vec<String> {
     let files: BTreeSet<&Path> =
@@ -153,7 +155,7 @@ fn absent(views: &[TrainingView]) -> Vec<String> {
         (!files.is_empty()).then(|| format!("{} {what}: {}{more}", files.len(), named.join(", ")))
     };
     let gone: Vec<&Path> = files.iter().copied().filter(|path| !path.is_file()).collect();
-    let videos: Vec<&Path> = files.iter().copied().filter(|path| is_video(path) && path.is_file()).collect();
+    let videos: Vec<&Path> = files.iter().copied().filter(|path| is_video(path)).collect();
     let gone = listed(&gone, "images or masks are not on disk").map(|sentence| format!("{sentence} ({LOOKED_FOR})"));
     let videos = listed(&videos, "videos have not been decoded, which needs ffmpeg; each counts as one view here");
     [gone, videos].into_iter().flatten().collect()

@@ -5,10 +5,9 @@
 //! allows: single views between training views would only measure how well neighboring views are reproduced.
 
 use super::TrainingView;
+use super::Validation;
 use super::selection::{distinct_cameras, distinct_times, identity};
-use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
-use std::fmt;
 
 /// Fraction of the cameras, or of the times, that is held out.
 const FRACTION: f64 = 0.1;
@@ -18,41 +17,6 @@ const FEWEST_CAMERAS: usize = 4;
 const FEWEST_TIMES: usize = 8;
 /// Number of blocks of time.
 const BLOCKS: usize = 3;
-
-/// The way in which validation views are found.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Validation {
-    /// The first of these that the dataset allows: a file of validation views, whole cameras, blocks of time, none.
-    #[default]
-    Auto,
-    /// The views of the dataset's own split `val`, such as `transforms_val.json`.
-    File,
-    /// Every view of some of the training cameras.
-    Cameras,
-    /// Every training view in some contiguous blocks of time.
-    Times,
-    /// None: there are no validation views to choose on, and every training view is trained on.
-    None,
-}
-
-impl Validation {
-    /// Every value with its name.
-    pub const NAMES: [(&str, Self); 5] = [
-        ("auto", Self::Auto),
-        ("file", Self::File),
-        ("cameras", Self::Cameras),
-        ("times", Self::Times),
-        ("none", Self::None),
-    ];
-}
-
-impl fmt::Display for Validation {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let name = Self::NAMES.iter().find(|(_, value)| value == self).map_or("", |(name, _)| name);
-        f.write_str(name)
-    }
-}
 
 /// The views of a training split, divided.
 #[derive(Debug, Clone, PartialEq)]
@@ -65,10 +29,10 @@ pub struct HeldOut {
     pub by: Validation,
 }
 
-/// Divides training views by whole cameras or by blocks of time. `wanted` selects the way; with [`Validation::Auto`], whole
-/// cameras if there are at least four cameras of several views each (or if all views have the same time), else blocks of
-/// time if there are at least eight distinct times, else nothing is held out. Returns `None` if the views do not allow
-/// the wanted way.
+/// Divides training views by whole cameras or by blocks of time. `wanted` selects the way; with [`Validation::Auto`],
+/// whole cameras if there are at least four cameras of several views each (or if all views have the same time), else
+/// blocks of time if there are at least eight distinct times, else nothing is held out. Returns `None` if the views do
+/// not allow the wanted way.
 pub fn hold_out(views: &[TrainingView], wanted: Validation) -> Option<HeldOut> {
     let cameras = distinct_cameras(views).len();
     let times = distinct_times(views);

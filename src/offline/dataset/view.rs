@@ -1,47 +1,52 @@
 //! One training view and its image.
 //!
-//! In: a camera at a time with the path of a picture. Out: a [`CoveredImage`] of the size of the camera, which can be laid over any
-//! background. Over black it equals the image that the `dataloader` mode of the original evaluates against (section 5.3 of the 4DGS model).
-//! The in-memory mode of the original multiplies transparent images by alpha twice and is not reproduced.
+//! In: a camera at a time with the path of a picture. Out: a [`CoveredImage`] of the size of the camera, which can be
+//! laid over any background. Over black it equals the image that the `dataloader` mode of the original evaluates
+//! against (section 5.3 of the 4DGS model). The in-memory mode of the original multiplies transparent images by alpha
+//! twice and is not reproduced.
 
 use std::path::{Path, PathBuf};
 
 use glam::{UVec2, Vec3};
 use image::{DynamicImage, GrayImage, RgbaImage};
 
-use super::distortion::Undistortion;
-use super::files::require_files;
-use super::{DatasetError, MAX_SIDE, resample, video};
+use super::cameras::distortion::Undistortion;
+use super::cameras::resample;
+use super::formats::files::require_files;
+use super::formats::video;
+use super::{DatasetError, MAX_SIDE};
 use crate::offline::picture_file;
 use crate::view::{Camera, Picture};
 
-/// Largest ratio of the width and of the height of an image to the size in the camera file. Larger images are accepted because camera
-/// files made for reduced images are used with the original images; the image is scaled to the size of the camera.
+/// Largest ratio of the width and of the height of an image to the size in the camera file. Larger images are accepted
+/// because camera files made for reduced images are used with the original images; the image is scaled to the size of
+/// the camera.
 const LARGER: u32 = 4;
 
 /// A camera at one time, and the path of the image taken there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrainingView {
-    /// Name for output files: the stem of the image path, without folders; unique within its camera file (a repeated stem has the
-    /// index of the frame appended, `-17`).
+    /// Name for output files: the stem of the image path, without folders; unique within its camera file (a repeated
+    /// stem has the index of the frame appended, `-17`).
     pub name: String,
     /// The camera, at the size to render.
     pub camera: Camera,
     /// Timestamp, in the capture's unit.
     pub time: f32,
-    /// Size of the image according to the camera file, or else to the first image, pixels. An image with a side of more than four
-    /// times this length is not decoded, and an image of another aspect ratio is refused.
+    /// Size of the image according to the camera file, or else to the first image, pixels. An image with a side of more
+    /// than four times this length is not decoded, and an image of another aspect ratio is refused.
     pub original: UVec2,
     /// Path of the image, which may not exist.
     pub image: PathBuf,
     /// Path of the coverage as an 8-bit gray image, by which the image has been multiplied already unless the
     /// [`correction`](Self::correction) does that; `None` if the view has none.
     pub mask: Option<PathBuf>,
-    /// What is done to the image when it is loaded.
+    /// Changes of the image when it is loaded.
     pub correction: Correction,
 }
 
-/// What is done to an image when it is loaded: the distortion of its lens is undone, and it is multiplied by its mask. Default: nothing.
+/// Changes of an image when it is loaded: the distortion of its lens is undone, and it is multiplied by its mask.
+/// Default: nothing.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Correction {
     pub(super) undistortion: Option<Undistortion>,
@@ -60,8 +65,8 @@ pub struct CoveredImage {
 }
 
 impl CoveredImage {
-    /// Returns the image over a background (RGB, 0 to 1). Values are at most 1, also where compression has made an image brighter
-    /// than its mask.
+    /// Returns the image over a background (RGB, 0 to 1). Values are at most 1, also where compression has made an
+    /// image brighter than its mask.
     pub fn over(&self, background: Vec3) -> Picture {
         let over = |texel: &[u8; 4]| (unit_rgb(texel) + (1.0 - unit(texel[3])) * background).min(Vec3::ONE);
         Picture { size: self.size, pixels: self.texels.iter().map(over).collect() }
@@ -69,15 +74,16 @@ impl CoveredImage {
 }
 
 impl TrainingView {
-    /// Loads the image and its coverage. A view with a mask has the mask as coverage, and its image has been multiplied by the mask
-    /// already, unless the correction multiplies the image's alpha by the mask. Without a mask the coverage is the alpha of the image,
-    /// which is 1 everywhere if the image has none. Colors times alpha are truncated to 8 bits, distortion is undone, and the result is
-    /// resampled to the size of the camera (the bicubic filter of Pillow), as in the `dataloader` mode of the original over black.
+    /// Loads the image and its coverage. A view with a mask has the mask as coverage, and its image has been multiplied
+    /// by the mask already, unless the correction multiplies the image's alpha by the mask. Without a mask the coverage
+    /// is the alpha of the image, which is 1 everywhere if the image has none. Colors times alpha are truncated to 8
+    /// bits, distortion is undone, and the result is resampled to the size of the camera (the bicubic filter of
+    /// Pillow), as in the `dataloader` mode of the original over black.
     ///
     /// # Errors
     /// [`DatasetError::MissingImages`] if the image or the mask is not on disk, [`DatasetError::Image`] if one cannot
-    /// be decoded, is truncated or is far larger than [`original`](Self::original), or [`DatasetError::Decoded`] if it is
-    /// a frame that was decoded from a video, [`DatasetError::Size`] if the size of the camera is out of range.
+    /// be decoded, is truncated or is far larger than [`original`](Self::original), or [`DatasetError::Decoded`] if it
+    /// is a frame that was decoded from a video, [`DatasetError::Size`] if the size of the camera is out of range.
     pub fn load_covered(&self) -> Result<CoveredImage, DatasetError> {
         let size = self.camera.size;
         if size.min_element() == 0 || size.max_element() > MAX_SIDE {
@@ -132,11 +138,12 @@ impl TrainingView {
     }
 }
 
-/// Returns whether one of two sizes, scaled to the width or the height of the other, differs from it by at most one pixel: a scaled
-/// picture has rounded sides.
-fn has_aspect_of(a: UVec2, b: UVec2) -> bool {
+/// Returns whether one of two sizes, scaled to the width or the height of the other, differs from it by at most one
+/// pixel: a scaled picture has rounded sides.
+pub(super) fn has_aspect_of(a: UVec2, b: UVec2) -> bool {
     let [ax, ay, bx, by] = [a.x, a.y, b.x, b.y].map(u64::from);
-    // Scaled to the width of a, the height of b differs by |ax · by − ay · bx| / bx; the other three cases follow by exchange.
+    // Scaled to the width of a, the height of b differs by |ax · by − ay · bx| / bx; the other three cases follow by
+    // exchange.
     (ax * by).abs_diff(ay * bx) <= ax.max(ay).max(bx).max(by)
 }
 

@@ -1,13 +1,15 @@
-//! Fitting: trains the Gaussians of a level on pictures of all Gaussians.
+//! Training the Gaussians of a level on pictures of all Gaussians.
 //!
-//! In: a scene in the trained form, [`Look`]s of all Gaussians. Out: the scene after a number of steps. Backgrounds are random, so that opacity
-//! is trained too. The scene is drawn with anti-aliasing, as levels are; gradients leave out the factor of anti-aliasing on opacity.
+//! In: a scene in the trained form, [`Look`]s of all Gaussians. Out: the scene after a number of steps. Backgrounds are
+//! random, so that opacity is trained too. The scene is drawn with anti-aliasing, as levels are; the gradients leave
+//! out the factor of anti-aliasing on opacity.
 
+use super::DetailError;
 use super::looks::Look;
 use crate::gaussian::GradientMode;
 use crate::offline::dataset::CoveredImage;
-use crate::offline::fine_tune::{GpuImage, Rates, Sample, Trainer};
-use crate::offline::{OfflineError, Progress, proceed};
+use crate::offline::train::{GpuImage, Rates, Sample, Trainer};
+use crate::offline::work::{Progress, proceed};
 use crate::renderer::Headless;
 use crate::scene::GaussianScene;
 use crate::scene::random::Random;
@@ -16,9 +18,9 @@ use glam::Vec3;
 
 /// Number of views of a step.
 const BATCH: usize = 4;
-/// Factor on the rates at the last step.
+/// Factor on the learning rates at the last step.
 const LAST_RATE: f64 = 0.05;
-/// The rates of color are higher than in fine-tuning, because the initial colors are estimates.
+/// Learning rates: those of color are higher than in fine-tuning, because the initial colors are estimates.
 const RATES: Rates = Rates { harmonics: 1e-3, color: 5e-3, ..Rates::OURS };
 
 /// Trains a scene on at least one look. Begins the task "fitting".
@@ -28,7 +30,7 @@ pub(super) fn fit(
     looks: &[Look],
     steps: usize,
     progress: &mut dyn Progress,
-) -> Result<GaussianScene, OfflineError> {
+) -> Result<GaussianScene, DetailError> {
     let trained_pixel = scene.trained_with.pixel;
     let views: Vec<View> = looks.iter().map(|look| look.view.antialiased(trained_pixel)).collect();
     let mut trainer = Trainer::new(headless, scene, GradientMode::Exact)?;
@@ -48,7 +50,7 @@ pub(super) fn fit(
             let (view, image) = (&views[index], &images[index]);
             batch.push(Sample { view, image, background, number: index as u32 });
         }
-        // Without SSIM, whose windows are larger than these pictures' details of a few pixels.
+        // Without SSIM, whose windows are larger than the details of these pictures.
         trainer.accumulate(&batch, 0.0)?;
         let factor = 1.0 - (1.0 - LAST_RATE) * step as f64 / steps as f64;
         trainer.step(&RATES, factor, step + 1)?;

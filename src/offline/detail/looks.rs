@@ -1,11 +1,15 @@
-//! Looks: pictures of all Gaussians from many directions, at one size on the screen. Levels are trained on them and compared with them.
+//! Pictures of all Gaussians from many directions, at one size on the screen. Levels are trained on them and compared
+//! with them.
 //!
-//! In: the bounding sphere of a capture, a size in pixels, numbers of directions and times. Out: [`Look`]s. Each has two pictures: the truth,
-//! which is a picture of many times as many pixels, averaged to the size, and the picture drawn at the size. Also the [`Closeness`] of a level.
+//! In: the bounding sphere of a capture, a size in pixels, numbers of directions and times. Out: [`Look`]s. Each has
+//! two pictures: the truth, which is a picture of many times as many pixels, averaged to the size, and the picture
+//! drawn at the size. For a level, its [`Closeness`] to all Gaussians.
 
-use crate::offline::memory_check::{BY_DIRECTIONS, Pictures};
-use crate::offline::metrics::decibels;
-use crate::offline::{OfflineError, Progress, proceed};
+use super::DetailError;
+use crate::offline::engine::Purpose;
+use crate::offline::engine::memory::Pictures;
+use crate::offline::measure::metrics::decibels;
+use crate::offline::work::{Progress, proceed};
 use crate::renderer::{GpuCapture, Headless};
 use crate::scene::detail::pixels_across;
 use crate::scene::{Bounds, RuntimeScene};
@@ -15,11 +19,12 @@ use serde::Serialize;
 
 /// Distance of the cameras from the center of the sphere, radii.
 const DISTANCE: f32 = 10.0;
-/// Least distance of the cameras from the sphere, near limits.
+/// Least distance of the cameras from the sphere, distances of the near plane.
 const NEAREST: f32 = 5.0;
 /// Pixels around the sphere.
 const MARGIN: u32 = 2;
-/// Least number of pixels across the sphere in the pictures that are averaged to the truth: about as many as in training.
+/// Least number of pixels across the sphere in the pictures that are averaged to the truth: about as many as in
+/// training.
 pub(super) const FINE: f32 = 512.0;
 /// Bytes for each pixel of a look: color and transmittance of two frames.
 const FRAMES: u64 = 2 * 16;
@@ -28,7 +33,7 @@ const SCREEN: f64 = 1280.0 * 720.0;
 /// Black, so that the picture has the color of the Gaussians alone.
 const BLACK: Background = Background::Color([0.0; 3]);
 
-/// The sphere about the bounds of a capture, capture units.
+/// The bounding sphere of a capture, capture units.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sphere {
     pub bounds: Bounds,
@@ -36,7 +41,7 @@ pub(super) struct Sphere {
     pub radius: f32,
     /// The first and the last timestamp that is shown.
     pub shown: [f32; 2],
-    /// Near limit of the capture, capture units.
+    /// Distance of the near plane, capture units.
     pub near: f32,
 }
 
@@ -71,7 +76,7 @@ pub struct Closeness {
     /// The size, pixels.
     pub pixels: f32,
     /// PSNR of the level against all Gaussians, drawn at this size, over a screen of 1280x720 pixels, dB; at most
-    /// [`MAX_PSNR`](crate::offline::metrics::MAX_PSNR).
+    /// [`MAX_PSNR`](crate::offline::measure::metrics::MAX_PSNR).
     pub screen: f64,
     /// PSNR of the level against the truth inside the rectangle of the capture, dB.
     pub truth: f64,
@@ -97,9 +102,9 @@ impl Sphere {
         })
     }
 
-    /// Returns the view from a direction (of length 1, away from the center) in which the sphere is `pixels` pixels across.
+    /// Returns the view from a direction (of length 1, away from the center) in which the sphere is `pixels` pixels
+    /// across.
     fn view(&self, direction: Vec3, time: f32, pixels: f32) -> View {
-        // No closer than the near limit allows.
         let distance = (DISTANCE * self.radius).max(self.radius + NEAREST * self.near);
         let side = pixels.ceil() as u32 + 2 * MARGIN;
         let focal = pixels / pixels_across(self.radius, distance, 1.0);
@@ -128,7 +133,8 @@ impl Around {
     }
 }
 
-/// Draws all Gaussians, whose training pixel is given, from all directions at each of these sizes, pixels. Begins the task "looking".
+/// Draws all Gaussians, whose training pixel is given, from all directions at each of these sizes, pixels. Begins the
+/// task "looking".
 pub(super) fn looks(
     headless: &mut Headless,
     capture: &GpuCapture,
@@ -137,11 +143,11 @@ pub(super) fn looks(
     around: Around,
     sizes: &[f32],
     progress: &mut dyn Progress,
-) -> Result<Vec<Vec<Look>>, OfflineError> {
+) -> Result<Vec<Vec<Look>>, DetailError> {
     // Frames of all sizes together have less than three times the pixels of the largest.
     let largest = sizes.iter().copied().fold(0.0, f32::max).ceil() as u32 + 2 * MARGIN;
     let views = (around.directions * around.times) as u64;
-    Pictures::frames(UVec2::splat(largest), views, 3 * FRAMES).require(Some(&*headless), BY_DIRECTIONS)?;
+    Pictures::frames(UVec2::splat(largest), views, 3 * FRAMES).require(Some(&*headless), Purpose::Directions)?;
     progress.begin("looking", sizes.len());
     let mut all = Vec::with_capacity(sizes.len());
     for &pixels in sizes {
@@ -207,7 +213,7 @@ pub(super) fn closeness(
     trained_pixel: Option<f32>,
     pixels: f32,
     looks: &[Look],
-) -> Result<Closeness, OfflineError> {
+) -> Result<Closeness, DetailError> {
     let farthest = f64::INFINITY;
     let mut close = Closeness { pixels, screen: farthest, truth: farthest, all: farthest };
     for look in looks {
@@ -222,8 +228,8 @@ pub(super) fn closeness(
     Ok(close)
 }
 
-/// Returns the mean square error between two frames inside a rectangle, over black or over white, whichever is larger; values are clamped
-/// to 0..1.
+/// Returns the mean square error between two frames inside a rectangle, over black or over white, whichever is larger;
+/// values are clamped to 0..1.
 fn square_error(a: &Frame, b: &Frame, [low, high]: [UVec2; 2]) -> f64 {
     let width = a.picture.size.x;
     let over = |frame: &Frame, at: usize, behind: f32| {
@@ -239,7 +245,8 @@ fn square_error(a: &Frame, b: &Frame, [low, high]: [UVec2; 2]) -> f64 {
     squares[0].max(squares[1]) / f64::from(count.max(1))
 }
 
-/// Returns the rectangle of a box in a view: its first corner, and the corner beyond its last pixel. It has at least one pixel.
+/// Returns the rectangle of a box in a view: its first corner, and the corner beyond its last pixel. It has at least
+/// one pixel.
 fn rectangle(view: &View, bounds: &Bounds) -> [UVec2; 2] {
     let [row_x, row_y] = view.clip_rows();
     let (mut low, mut high) = (Vec2::INFINITY, Vec2::NEG_INFINITY);

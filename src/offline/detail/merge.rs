@@ -1,13 +1,16 @@
-//! Merging: from many Gaussians to few that look nearly the same in pictures of few pixels.
+//! Merging many Gaussians to few that look nearly the same in pictures of few pixels.
 //!
-//! In: Gaussians ready to draw and their color, the number of merged Gaussians, the size of a pixel. Out: Gaussians in the trained form.
+//! In: Gaussians ready to draw and their color, the number of merged Gaussians, the size of a pixel. Out: Gaussians in
+//! the trained form.
 //!
-//! 1. Each Gaussian is a point of eight coordinates: its positions at the first and at the last time at which it is drawn, and these two
-//!    times. Gaussians of different motion or lifespan are far apart. The set with the largest spread is divided until there are enough sets.
-//! 2. Each set becomes one Gaussian with the mean and the covariance of the set in space and time. Color is averaged; the harmonics of time
-//!    are about each Gaussian's own temporal mean, so that moving the mean by `Δμ` multiplies `cos(n ω (μ − t))` by `cos(n ω Δμ)`.
-//! 3. Absorption is kept: a splat of opacity `o` and area `A` absorbs `A Li₂(o)`, the integral of `−ln(1 − o g)`. Areas are areas on the
-//!    screen, with the low-pass.
+//! 1. Each Gaussian is a point of eight coordinates: its positions at the first and at the last time at which it is
+//!    drawn, and these two times. Gaussians of different motion or lifespan are far apart. The set with the largest
+//!    spread is divided until there are enough sets.
+//! 2. Each set becomes one Gaussian with the mean and the covariance of the set in space and time. Color is averaged;
+//!    the harmonics of time are about each Gaussian's own temporal mean, so that moving the mean by `Δμ` multiplies
+//!    `cos(n ω (μ − t))` by `cos(n ω Δμ)`.
+//! 3. Absorption is kept: a splat of opacity `o` and area `A` absorbs `A Li₂(o)`, the integral of `−ln(1 − o g)`. Areas
+//!    are areas on the screen, with the low-pass.
 
 use super::rotation::Axes;
 use crate::gaussian::alpha::{ALPHA_MAX, ALPHA_MIN};
@@ -24,9 +27,9 @@ const LONGEST: f64 = 100.0;
 /// Coordinates of a Gaussian when sets are divided.
 const AXES: usize = 8;
 
-/// Merges Gaussians to at most `count`, for pictures with pixels of `pixel` capture units. `interval` is the time interval of the capture,
-/// `cutoff` the marginal at and below which a Gaussian is not drawn, `radius` the radius of the sphere about its bounds. Gaussians that are never
-/// drawn are left out.
+/// Merges Gaussians to at most `count`, for pictures with pixels of `pixel` capture units. `interval` is the time
+/// interval of the capture, `cutoff` the marginal at and below which a Gaussian is not drawn, `radius` the radius of
+/// the sphere about its bounds. Gaussians that are never drawn are left out.
 pub(super) fn merge(
     sliced: &Sliced,
     interval: [f32; 2],
@@ -184,7 +187,8 @@ fn push_merged(made: &mut Trained, set: &[Seen<'_>], harmonics: &Harmonics, span
     let mean_t = mean(&|one| f64::from(one.gaussian.mean_t));
     let variance_t = mean(&|one| one.sigma_t.powi(2) + (f64::from(one.gaussian.mean_t) - mean_t).powi(2));
     let sigma_t = variance_t.sqrt().min(LONGEST * span);
-    // Position and motion over the time that is shown: Gaussians with a far longer lifespan would otherwise add positions that are not shown.
+    // Position and motion over the time that is shown: Gaussians of a far longer lifespan would otherwise add positions
+    // that are not shown.
     let middle = |one: &Seen<'_>| 0.5 * (one.from + one.to);
     let shown = |one: &Seen<'_>| one.sigma_t.min((one.to - one.from) / 12f64.sqrt()).powi(2);
     let center_t = mean(&middle);
@@ -205,18 +209,9 @@ fn push_merged(made: &mut Trained, set: &[Seen<'_>], harmonics: &Harmonics, span
 
     let Parameters { mean: means, mean_t: times, log_scale, log_scale_t, rotation_l, rotation_r, opacity_logit } =
         &mut made.parameters;
-    let joint = {
-        let block = conditional + outer(velocity) * sigma_t.powi(2);
-        let across = velocity * sigma_t.powi(2);
-        DMat4::from_cols(
-            block.x_axis.extend(across.x),
-            block.y_axis.extend(across.y),
-            block.z_axis.extend(across.z),
-            across.extend(sigma_t.powi(2)),
-        )
-    };
     let least = (conditional.x_axis.x + conditional.y_axis.y + conditional.z_axis.z).max(0.0).sqrt() * 1e-4;
-    let Axes { scale, left, right } = Axes::of(joint, least.max(1e-12));
+    let Axes { scale, left, right } =
+        Axes::of(joint_covariance(conditional, velocity, sigma_t.powi(2)), least.max(1e-12));
     let [x, y, z, t] = scale.map(f64::ln).as_vec4().to_array();
     means.push((center + velocity * (mean_t - center_t)).as_vec3().to_array());
     times.push(mean_t as f32);
@@ -227,6 +222,19 @@ fn push_merged(made: &mut Trained, set: &[Seen<'_>], harmonics: &Harmonics, span
     rotation_r.push(single(right));
     opacity_logit.push((opacity / (1.0 - opacity)).ln() as f32);
     made.harmonics.values.extend(merged_color(set, total, harmonics, mean_t, span));
+}
+
+/// Returns the covariance in space and time of a Gaussian with this covariance in space at each time, this velocity and
+/// this temporal variance.
+fn joint_covariance(conditional: DMat3, velocity: DVec3, variance_t: f64) -> DMat4 {
+    let block = conditional + outer(velocity) * variance_t;
+    let across = velocity * variance_t;
+    DMat4::from_cols(
+        block.x_axis.extend(across.x),
+        block.y_axis.extend(across.y),
+        block.z_axis.extend(across.z),
+        across.extend(variance_t),
+    )
 }
 
 /// Returns the color of a set, the coefficients that are evaluated.

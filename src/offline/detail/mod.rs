@@ -1,82 +1,40 @@
 //! Levels of detail: the same capture with fewer Gaussians, for pictures of few pixels.
 //!
-//! In: a scene, [`DetailSettings`]. Out: the scene with levels ([`Detailed`]), each with the size on the screen up to which it is drawn.
+//! In: a scene, [`DetailSettings`]. Out: the scene with levels ([`Detailed`]), each with the size on the screen up to
+//! which it is drawn. `maker` makes one level after the other:
 //!
-//! 1. `merge` replaces many Gaussians by few with the same moments in space and time; `rotation` converts covariances to raw parameters.
-//! 2. `fit` trains the merged Gaussians at the sizes at which the level is drawn, on the mean of two pictures of all Gaussians: the truth, a
-//!    picture of many times as many pixels, averaged, and the picture drawn at that size, which the level replaces. The two differ much: as in
-//!    the original, each splat is blurred to at least half a pixel, so that many small splats look larger and denser than they are; with the
-//!    fainter splats of [anti-aliasing], less dense.
-//! 3. `looks` compares the level with all Gaussians in other views, at each size. A level is drawn up to the largest size at which it is about
-//!    as close to the truth as all Gaussians are, and at which the change of a screen is hardly visible. A level without such a size is not
-//!    kept.
+//! 1. `merge` replaces many Gaussians by few with the same moments in space and time; `rotation` converts covariances
+//!    to raw parameters.
+//! 2. `fit` trains the merged Gaussians at the sizes at which the level is drawn, on the mean of two pictures of all
+//!    Gaussians: the truth, which is a picture of many times as many pixels, averaged, and the picture drawn at that
+//!    size, which the level replaces. The two differ much: as in the original, each splat is blurred to at least half a
+//!    pixel, so that many small splats look larger and denser than they are; with [anti-aliasing], which makes splats
+//!    fainter, less dense.
+//! 3. `looks` compares the level with all Gaussians in other views, at each size. A level is drawn up to the largest
+//!    size at which it is about as close to the truth as all Gaussians are, and at which the change of a screen is
+//!    hardly visible. A level without such a size is not kept.
 //!
 //! [anti-aliasing]: crate::view::View::antialiased
 
+mod error;
 mod fit;
 mod looks;
+mod maker;
 mod merge;
 mod rotation;
+mod settings;
 
-use super::convert::require_no_windows;
-use super::quantize::{CompressSettings, Quality, compress};
-use super::{OfflineError, Progress};
-use crate::renderer::Headless;
-use crate::scene::{Form, GaussianScene, Level, MAX_LEVELS, RuntimeScene, SceneForm, Sliced, TrainedWith};
-use fit::fit;
+pub use error::DetailError;
 pub use looks::Closeness;
-use looks::{Around, FINE, Look, Sphere, closeness, looks};
-use merge::merge;
-use serde::Serialize;
-use std::sync::Arc;
+pub use maker::MadeLevel;
+pub use settings::DetailSettings;
 
-/// Sizes on the screen at which levels are compared, pixels: each about a quarter larger than the previous size.
-const SIZES: [f32; 19] =
-    [4.0, 5.0, 6.3, 8.0, 10.0, 12.5, 16.0, 20.0, 25.0, 32.0, 40.0, 50.0, 63.0, 80.0, 100.0, 125.0, 160.0, 200.0, 250.0];
-/// The number of Gaussians of a level is that of the finer level divided by this.
-const COARSER: usize = 7;
-/// Gaussians for each square pixel of the design size of a level.
-const DENSITY: f32 = 0.2;
-/// Sizes at which a level is trained, as fractions of its design size.
-const TRAINED_AT: [f32; 3] = [1.0, 0.7, 0.5];
-/// Most PSNR against the truth that a level may lose against all Gaussians, dB.
-const FARTHER: f64 = 0.5;
-/// Number of sizes below its limit at which a level must be as close to the truth too. Below these sizes, a coarser level is usually drawn.
-const SMALLER: usize = 2;
-/// Fewest Gaussians of a level.
-const FEWEST: usize = 8;
-
-/// Settings of the levels.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct DetailSettings {
-    /// Number of levels, at most [`MAX_LEVELS`]; each has a seventh of the Gaussians of the finer level. Default: 3.
-    pub levels: usize,
-    /// Lowest PSNR of a screen of 1280x720 pixels on which a level replaces all Gaussians, dB. Default: 45.
-    pub min_psnr: f64,
-    /// Training steps of each level; 0 leaves the merged Gaussians unchanged. Default: 2000.
-    pub steps: usize,
-    /// Number of directions from which each level is trained and compared. Default: 24.
-    pub directions: usize,
-    /// Number of times of each direction. Default: 6.
-    pub times: usize,
-}
-
-impl Default for DetailSettings {
-    fn default() -> Self {
-        Self { levels: 3, min_psnr: 45.0, steps: 2000, directions: 24, times: 6 }
-    }
-}
-
-/// A level, kept or not.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct MadeLevel {
-    /// Number of Gaussians.
-    pub gaussians: usize,
-    /// The largest size on the screen at which the level is drawn, pixels; `None` if it is not kept.
-    pub pixels: Option<f32>,
-    /// The closeness to all Gaussians at each size.
-    pub measured: Vec<Closeness>,
-}
+use crate::offline::forms::convert::require_no_windows;
+use crate::offline::work::Progress;
+use crate::renderer::Headless;
+use crate::scene::GaussianScene;
+use looks::Sphere;
+use maker::Maker;
 
 /// A scene with levels of detail.
 #[derive(Debug, Clone, PartialEq)]
@@ -87,199 +45,28 @@ pub struct Detailed {
     pub made: Vec<MadeLevel>,
 }
 
-/// Makes levels of detail, which replace those of the scene. The levels of a packed scene are packed, those of other scenes are in single
-/// precision; no level has a temporal filter. Begins the task "levels" and, inside it, tasks for each level.
+/// Makes levels of detail, which replace those of the scene. The levels of a packed scene are packed, those of other
+/// scenes are in single precision; no level has a temporal filter. Begins the task "levels" and, inside it, tasks for
+/// each level.
 ///
 /// # Errors
-/// A scene with an environment map or with windows of time, a scene of which no Gaussian is drawn, a scene that does not fit the GPU, a lost device.
+/// A scene with an environment map or with windows of time, a scene of which no Gaussian is drawn, a scene that does
+/// not fit the GPU, a lost device.
 pub fn detail(
     headless: &mut Headless,
     mut scene: GaussianScene,
     settings: &DetailSettings,
     progress: &mut dyn Progress,
-) -> Result<Detailed, OfflineError> {
+) -> Result<Detailed, DetailError> {
     if scene.environment.is_some() {
-        return Err(OfflineError::Surrounded);
+        return Err(DetailError::Surrounded);
     }
     require_no_windows(scene.filter.as_ref(), "a level of detail")?;
     scene.levels.clear();
     let full = scene.clone().into_runtime()?;
-    let sphere = Sphere::of(&full).ok_or(OfflineError::NothingDrawn)?;
+    let sphere = Sphere::of(&full).ok_or(DetailError::NothingDrawn)?;
     let mut maker = Maker { headless, settings, sphere, full, levels: Vec::new() };
     let made = maker.run(progress)?;
     scene.levels = maker.levels;
     Ok(Detailed { scene, made })
-}
-
-/// The inputs of all levels, and the levels kept so far.
-struct Maker<'a> {
-    headless: &'a mut Headless,
-    settings: &'a DetailSettings,
-    sphere: Sphere,
-    /// All Gaussians, in the form that is stored.
-    full: RuntimeScene,
-    /// The levels that are kept, finest first.
-    levels: Vec<Level>,
-}
-
-impl Maker<'_> {
-    fn run(&mut self, progress: &mut dyn Progress) -> Result<Vec<MadeLevel>, OfflineError> {
-        let count = self.settings.levels.min(MAX_LEVELS);
-        let sliced = match &self.full.form {
-            Form::Sliced(sliced) => sliced.clone(),
-            Form::Packed(packed) => packed.clone().unpack(),
-        };
-        progress.begin("levels", count + 1);
-        let compared = self.looks(&SIZES, 0.5, progress)?;
-        progress.advance();
-        let mut made = Vec::new();
-        let mut left = self.full.len();
-        for _ in 0..count {
-            left /= COARSER;
-            if left < FEWEST {
-                progress.note("fewer Gaussians than these make no level");
-                break;
-            }
-            made.push(self.make(&sliced, left, &compared, progress)?);
-            progress.advance();
-        }
-        progress.finish();
-        for one in &mut made {
-            let is_kept = |pixels: &f32| {
-                self.levels.iter().any(|level| level.pixels == *pixels && level.scene.len() == one.gaussians)
-            };
-            one.pixels = one.pixels.filter(is_kept);
-        }
-        Ok(made)
-    }
-
-    /// Draws all Gaussians in the views with this shift.
-    fn looks(
-        &mut self,
-        sizes: &[f32],
-        shift: f32,
-        progress: &mut dyn Progress,
-    ) -> Result<Vec<Vec<Look>>, OfflineError> {
-        let DetailSettings { directions, times, .. } = *self.settings;
-        let around = Around { directions: directions.max(1), times: times.max(1), shift };
-        let capture = self.headless.upload(&self.full)?;
-        let trained_pixel = Some(self.full.optics(0, true).trained_pixel);
-        looks(self.headless, &capture, &self.sphere, trained_pixel, around, sizes, progress)
-    }
-
-    /// Makes a level of at most `count` Gaussians, and keeps it if it is close enough at some size.
-    fn make(
-        &mut self,
-        sliced: &Sliced,
-        count: usize,
-        compared: &[Vec<Look>],
-        progress: &mut dyn Progress,
-    ) -> Result<MadeLevel, OfflineError> {
-        let pixels = (count as f32 / DENSITY).sqrt().clamp(SIZES[0], SIZES[SIZES.len() - 1]);
-        let trained = &self.full.trained_with;
-        let radius = self.sphere.radius;
-        let pixel = 2.0 * f64::from(radius) / f64::from(pixels);
-        let merged = merge(sliced, trained.time_interval, trained.marginal_cutoff, radius, count, pixel);
-        let start = GaussianScene {
-            form: SceneForm::Trained(merged),
-            environment: None,
-            filter: None,
-            // The merged temporal deviations include the prefilter.
-            trained_with: TrainedWith {
-                prefilter_var: -1.0,
-                spatial_lr_scale: radius.into(),
-                // Always anti-aliased, since levels are drawn where pixels are large, and therefore without another filter.
-                pixel: Some(trained.pixel.unwrap_or(2.0 * radius / FINE)),
-                mip_filter: false,
-                ..trained.clone()
-            },
-            playback: self.full.playback,
-            levels: Vec::new(),
-        };
-        if start.is_empty() {
-            return Ok(MadeLevel { gaussians: 0, pixels: None, measured: Vec::new() });
-        }
-        let fitted = match self.settings.steps {
-            0 => start,
-            steps => {
-                let sizes = TRAINED_AT.map(|part| (pixels * part).max(SIZES[0]));
-                let shown: Vec<Look> = self.looks(&sizes, 0.0, progress)?.into_iter().flatten().collect();
-                fit(self.headless, start, &shown, steps, progress)?
-            }
-        };
-        let level = self.stored(fitted.into_runtime()?)?;
-        let capture = self.headless.upload(&level)?;
-        let mut measured = Vec::new();
-        for (&pixels, looks) in SIZES.iter().zip(compared) {
-            measured.push(closeness(self.headless, &capture, level.trained_with.pixel, pixels, looks)?);
-        }
-        let largest = largest(&measured, self.settings.min_psnr);
-        let gaussians = level.len();
-        progress.note(&describe(gaussians, largest));
-        if let Some(Closeness { pixels, .. }) = largest {
-            // A finer level whose largest size is not larger than this level's is never drawn.
-            self.levels.retain(|finer| finer.pixels > pixels);
-            self.levels.push(Level { pixels, scene: Arc::new(level) });
-        }
-        Ok(MadeLevel { gaussians, pixels: largest.map(|close| close.pixels), measured })
-    }
-
-    /// Returns a level in the form that is stored: packed if all Gaussians are.
-    fn stored(&self, level: RuntimeScene) -> Result<RuntimeScene, OfflineError> {
-        match &self.full.form {
-            Form::Sliced(_) => Ok(level),
-            Form::Packed(_) => {
-                let settings = CompressSettings::suiting(Quality::Balanced, level.len());
-                Ok(compress(level, &settings)?.0.into_runtime()?)
-            }
-        }
-    }
-}
-
-/// Returns the largest size at which a level may be drawn: the level is close enough there and at the next smaller sizes. `None` if there is
-/// no such size.
-fn largest(measured: &[Closeness], min_psnr: f64) -> Option<Closeness> {
-    // NaN fails every comparison.
-    let holds = |close: &Closeness| close.screen >= min_psnr && close.truth >= close.all - FARTHER;
-    let unseen = |close: &Closeness| close.screen >= min_psnr;
-    let held = |&last: &usize| {
-        measured[..last].iter().all(unseen) && measured[last.saturating_sub(SMALLER)..=last].iter().all(holds)
-    };
-    (0..measured.len()).rev().find(held).map(|last| measured[last])
-}
-
-/// Returns a line about a level.
-fn describe(gaussians: usize, largest: Option<Closeness>) -> String {
-    match largest {
-        Some(Closeness { pixels, screen, truth, all }) => format!(
-            "{gaussians} Gaussians: up to {pixels} pixels; there {screen:.1} dB on a screen, {truth:.1} dB to the truth (all: {all:.1} dB)"
-        ),
-        None => format!("{gaussians} Gaussians: not close enough at any size"),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_largest_size_of_a_level_also_holds_at_smaller_sizes() {
-        let close = |pixels, screen, truth, all| Closeness { pixels, screen, truth, all };
-        let good = |pixels| close(pixels, 50.0, 30.0, 20.0);
-        let limit = |measured: &[Closeness]| largest(measured, 45.0).map(|close| close.pixels);
-        assert_eq!(
-            limit(&[good(4.0), good(6.0), close(8.0, 44.0, 30.0, 20.0)]),
-            Some(6.0),
-            "the screen changes at 8 pixels"
-        );
-        assert_eq!(
-            limit(&[good(4.0), good(6.0), close(8.0, 50.0, 19.0, 20.0)]),
-            Some(6.0),
-            "all Gaussians are closer to the truth at 8 pixels"
-        );
-        let gap = [good(4.0), close(6.0, 50.0, 19.0, 20.0), good(8.0), good(11.0), good(16.0), good(23.0)];
-        assert_eq!(limit(&gap), Some(23.0), "a size far below the limit need not be close to the truth");
-        assert_eq!(limit(&gap[..4]), Some(4.0), "the two sizes below the limit must be close to the truth");
-        assert_eq!(limit(&[close(4.0, f64::NAN, 1.0, 0.0)]), None, "NaN is not close");
-    }
 }

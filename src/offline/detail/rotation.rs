@@ -1,7 +1,7 @@
 //! A 4D covariance as raw parameters of a Gaussian: scales and a pair of quaternions.
 //!
-//! In: a symmetric 4D matrix. Out: the standard deviations along its axes, with the axis closest to time last, and the quaternions of the
-//! rotation to these axes, as [`rotation_4d`] reads them.
+//! In: a symmetric 4D matrix. Out: the standard deviations along its axes, with the axis closest to time last, and the
+//! quaternions of the rotation to these axes, as [`rotation_4d`] reads them.
 
 use crate::gaussian::eigen::eigen;
 use crate::gaussian::rotation_4d;
@@ -19,7 +19,8 @@ pub(super) struct Axes {
 }
 
 impl Axes {
-    /// Decomposes a covariance. `least` is the smallest standard deviation; variances below its square, also negative ones, are raised to it.
+    /// Decomposes a covariance. `least` is the smallest standard deviation; variances below its square, also negative
+    /// ones, are raised to it.
     pub(super) fn of(covariance: DMat4, least: f64) -> Self {
         let (values, mut axes) = eigen(covariance);
         let mut scale = values.max(DVec4::splat(least * least)).map(f64::sqrt);
@@ -36,10 +37,11 @@ impl Axes {
     }
 }
 
-/// Returns a pair of unit quaternions of a rotation: the inverse of [`rotation_4d`]. The negated pair is the same rotation.
+/// Returns a pair of unit quaternions of a rotation: the inverse of [`rotation_4d`]. The negated pair is the same
+/// rotation.
 ///
-/// `rotation_4d` is linear in each quaternion, and its sixteen products of unit axes are orthogonal matrices of norm 2. The coordinates in
-/// that basis are therefore the products of the components of both quaternions.
+/// `rotation_4d` is linear in each quaternion, and its sixteen products of unit axes are orthogonal matrices of norm 2.
+/// The coordinates in that basis are therefore the products of the components of both quaternions.
 fn quaternions(rotation: DMat4) -> (DVec4, DVec4) {
     let product = |i: usize, j: usize| {
         let basis = rotation_4d(DVec4::AXES[i], DVec4::AXES[j]);

@@ -1,7 +1,7 @@
-//! EXR pictures in the colors that datasets have.
+//! EXR pictures in the colors of datasets.
 //!
-//! In: linear light, multiplied by alpha, in single precision. Out: sRGB-encoded colors, not multiplied by alpha, with 8 bits. In: an error of the
-//! decoder. Out: the fault and the remedy.
+//! In: linear light, premultiplied by alpha, in single precision; or an error of the decoder. Out: sRGB-encoded colors
+//! of 8 bits, not premultiplied; or a sentence with the fault and the remedy.
 
 use crate::view::srgb;
 use glam::{Vec3, Vec4};
@@ -9,12 +9,12 @@ use image::error::{DecodingError, ImageFormatHint};
 use image::{DynamicImage, ImageError, ImageFormat, Rgba, RgbaImage};
 use std::error::Error;
 
-/// What the decoder says of a picture without the channels R, G and B, or with lists of values for each pixel.
+/// The decoder's message about a picture without the channels R, G and B, or with lists of values for each pixel.
 const NO_RGB: &str = "image does not contain non-deep rgb channels";
-/// What it says of a file that ends too early.
+/// The decoder's message about a file that ends too early.
 const CUT: &str = "invalid: reference to missing bytes";
 
-/// Returns an error of the decoder of EXR with a sentence in place of the decoder's words. Other errors are unchanged.
+/// Returns an error of the EXR decoder with a [`sentence`] in place of its message. Other errors are unchanged.
 pub(super) fn in_words(error: ImageError) -> ImageError {
     let hint = ImageFormatHint::Exact(ImageFormat::OpenExr);
     let said = match &error {
@@ -24,10 +24,11 @@ pub(super) fn in_words(error: ImageError) -> ImageError {
     said.map_or(error, |said| ImageError::Decoding(DecodingError::new(hint, sentence(&said))))
 }
 
-/// Returns the fault and the remedy for what the decoder says.
+/// Returns the fault and the remedy for a message of the decoder.
 fn sentence(said: &str) -> String {
     if said == NO_RGB {
-        return "it has no channels R, G and B with one value for each pixel (it may be gray, of depths, or \"deep\"): save it as RGB or RGBA"
+        return "it has no channels R, G and B with one value for each pixel (it may be gray, of depths, or \"deep\"): \
+                save it as RGB or RGBA"
             .to_owned();
     }
     if said == CUT {
@@ -42,7 +43,7 @@ fn sentence(said: &str) -> String {
     }
 }
 
-/// Encodes the colors. Light above 1 becomes white; what is not a number becomes 0.
+/// Encodes the colors. Light above 1 becomes white, NaN becomes 0.
 pub(super) fn displayed(image: DynamicImage) -> DynamicImage {
     let linear = image.into_rgba32f();
     let pixel = |x: u32, y: u32| {

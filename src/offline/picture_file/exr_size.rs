@@ -1,13 +1,14 @@
-//! The size of an EXR picture before it is decoded. Its decoder unpacks every channel of every pixel that the file has, whatever is shown of them.
+//! The unpacked size of an EXR picture, before it is decoded: the decoder unpacks all channels of all parts, also those
+//! that are not used.
 //!
-//! In: the bytes of a file. Out: how many bytes its pixels unpack to, by the headers of its parts.
+//! In: the bytes of a file. Out: the bytes that its pixels unpack to, by the headers of its parts.
 
 /// The first bytes: four of the format, four of the version.
 const START: usize = 8;
 /// Bytes of a channel after its name: type, linearity and distance of samples.
 const CHANNEL: usize = 16;
 
-/// Returns the bytes of all pixels. What is damaged is left to the decoder.
+/// Returns the bytes of all pixels. Damaged headers are left to the decoder.
 pub(super) fn unpacked(bytes: &[u8]) -> u64 {
     let (mut rest, mut sum) = (bytes.get(START..).unwrap_or_default(), 0_u64);
     // The headers of a file of several parts end with an empty one.
@@ -18,7 +19,7 @@ pub(super) fn unpacked(bytes: &[u8]) -> u64 {
     sum
 }
 
-/// What a header says of a part.
+/// The size of a part, by its header.
 #[derive(Debug, Default)]
 struct Header {
     /// Number of pixels.
@@ -27,7 +28,7 @@ struct Header {
     pixel: u64,
 }
 
-/// Reads a header, and returns what follows it; `None` if there is none, or none that is whole.
+/// Reads a header, and returns the bytes after it; `None` if there is no whole header.
 fn header(mut rest: &[u8]) -> Option<(Header, &[u8])> {
     let mut found = Header::default();
     let mut is_empty = true;
@@ -71,7 +72,7 @@ fn channels(mut list: &[u8]) -> Option<u64> {
     }
 }
 
-/// Splits a text that ends with a zero from what follows it.
+/// Splits a text that ends with a zero from the bytes after it.
 fn text(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
     let end = bytes.iter().position(|&byte| byte == 0)?;
     Some((&bytes[..end], &bytes[end + 1..]))

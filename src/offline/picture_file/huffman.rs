@@ -16,7 +16,8 @@ pub(super) struct Table {
 }
 
 impl Table {
-    /// Creates a table from the number of codes of each length from 1 to 16 bits; `None` if a length has more codes than bit patterns.
+    /// Creates a table from the number of codes of each length from 1 to 16 bits; `None` if a length has more codes
+    /// than bit patterns.
     pub(super) fn new(counts: &[u8; 16], symbols: &[u8]) -> Option<Self> {
         let mut table = Self { ends: [0; 16], offsets: [0; 16], symbols: symbols.to_vec() };
         let (mut code, mut place) = (0u32, 0u32);

@@ -1,11 +1,11 @@
 //! Pictures on disk: the only place where PNG, JPEG and EXR files are decoded.
 //!
-//! In: a path, and the largest size that the picture may have. Out: the picture, or a [`PictureError`] that names the file, the reason and the
-//! remedy.
+//! In: a path, and the largest size that the picture may have. Out: the picture, or a [`PictureError`] that names the
+//! file, the reason and the remedy.
 //!
-//! The size is compared before decoding, with the expected one and with the [`Budget`] of the file, so that a small file cannot take much time and
-//! memory. Of a PNG the decoder gets only the chunks that change pixels (`png`); of an EXR all channels count (`exr_size`). A JPEG must be complete,
-//! which its decoder does not check (`jpeg`).
+//! The size is compared before decoding, with the expected one and with the [`Budget`] of the file, so that a small
+//! file cannot take much time and memory. Of a PNG the decoder gets only the chunks that change pixels (`png`); of an
+//! EXR all channels count (`exr_size`). A JPEG must be complete, which its decoder does not check (`jpeg`).
 
 mod exr;
 mod exr_size;
@@ -29,6 +29,7 @@ const MAX_BYTES: u64 = 1 << 30;
 
 /// The reason why a picture was not decoded.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum PictureError {
     /// The file cannot be read.
     #[error("{}: cannot be read: {reason}", .path.display())]
@@ -68,17 +69,23 @@ pub enum PictureError {
         largest: UVec2,
     },
     /// The picture would take more memory than a picture of so few bytes may take.
-    #[error("{}: the picture, {} x {} pixels, {reason}: scale it, or save it uncompressed", .path.display(), .size.x, .size.y)]
+    #[error(
+        "{}: the picture, {} x {} pixels, {reason}: scale it, or save it uncompressed",
+        .path.display(), .size.x, .size.y
+    )]
     TooMuch {
         /// The file.
         path: PathBuf,
         /// Width and height of the picture, pixels.
         size: UVec2,
-        /// What it takes, and the limit.
+        /// The memory it takes, and the limit.
         reason: String,
     },
     /// The picture, or its file, is larger than the limit for all pictures.
-    #[error("{}: a picture of more than {MAX_PIXELS} pixels or {MAX_BYTES} bytes is not decoded: scale it", .path.display())]
+    #[error(
+        "{}: a picture of more than {MAX_PIXELS} pixels or {MAX_BYTES} bytes is not decoded: scale it",
+        .path.display()
+    )]
     FarTooLarge {
         /// The file.
         path: PathBuf,
@@ -97,7 +104,8 @@ pub fn size(path: &Path, largest: UVec2) -> Result<UVec2, PictureError> {
     checked_size(path, &decoder, largest)
 }
 
-/// Decodes a picture, linear light to sRGB-encoded colors. The contents of the file determine its format, not its name.
+/// Decodes a picture. Linear light (EXR) becomes sRGB-encoded colors. The contents of the file determine its format,
+/// not its name.
 ///
 /// # Errors
 /// As [`size`], and a picture that is damaged or not complete.
@@ -123,7 +131,7 @@ pub fn open(path: &Path, largest: UVec2) -> Result<DynamicImage, PictureError> {
     Ok(if format == Some(ImageFormat::OpenExr) { exr::displayed(image) } else { image })
 }
 
-/// Reads what the decoder needs of a file of limited length, which is returned, too.
+/// Reads a file of limited length. Returns the bytes that the decoder needs, and the length of the file.
 fn read(path: &Path) -> Result<(Vec<u8>, u64), PictureError> {
     let mut bytes = Vec::new();
     let file = File::open(path).and_then(|file| file.take(MAX_BYTES + 1).read_to_end(&mut bytes));

@@ -1,7 +1,7 @@
 //! The chunks of a PNG, before they are decoded.
 //!
-//! In: the bytes of a file. Out: the file without the chunks that change no pixel, since the decoder unpacks color profiles to any size; whether its
-//! palette has complete colors, since the decoder does not check it, and panics if not.
+//! In: the bytes of a file. Out: the file without the chunks that change no pixel, since the decoder unpacks color
+//! profiles of any size; whether its palette has complete colors, since the decoder panics if it has not.
 
 /// Bytes of the signature.
 const SIGNATURE: usize = 8;
@@ -9,8 +9,8 @@ const SIGNATURE: usize = 8;
 const START: &[u8] = b"\x89PNG\r\n\x1a\n";
 /// The chunk of transparent colors, which changes pixels although readers may skip it.
 const TRANSPARENCY: [u8; TYPE] = *b"tRNS";
-/// The bit of the first letter of a type by which readers may skip a chunk.
-const SKIPPED: u8 = 0x20;
+/// The bit of the first letter of a type that marks a chunk as ancillary: readers may skip it.
+const ANCILLARY: u8 = 0x20;
 /// Bytes of the length of a chunk.
 const LENGTH: usize = 4;
 /// Bytes of the type of a chunk.
@@ -18,14 +18,15 @@ const TYPE: usize = 4;
 /// Bytes of the checksum of a chunk.
 const CHECKSUM: usize = 4;
 
-/// Removes the chunks that change no pixel: color profiles, texts, and so on. What is cut off stays, and files of other formats.
+/// Removes the chunks that change no pixel: color profiles, texts, and so on. A chunk that is cut off stays; files of
+/// other formats are unchanged.
 pub(super) fn remove_others(bytes: &mut Vec<u8>) {
     if !bytes.starts_with(START) {
         return;
     }
     let (mut from, mut to) = (SIGNATURE, SIGNATURE);
     while let Some((kind, length)) = chunk(bytes, from) {
-        if kind == TRANSPARENCY || kind[0] & SKIPPED == 0 {
+        if kind == TRANSPARENCY || kind[0] & ANCILLARY == 0 {
             bytes.copy_within(from..from + length, to);
             to += length;
         }
@@ -34,7 +35,8 @@ pub(super) fn remove_others(bytes: &mut Vec<u8>) {
     bytes.drain(to..from);
 }
 
-/// Returns the type of the chunk at a place and its length with everything around its contents; `None` if there is no whole chunk.
+/// Returns the type of the chunk at a place and its whole length, with type and checksum; `None` if the chunk is cut
+/// off.
 fn chunk(bytes: &[u8], at: usize) -> Option<([u8; TYPE], usize)> {
     let (length, after) = bytes.get(at..)?.split_first_chunk::<LENGTH>()?;
     let (kind, after) = after.split_first_chunk::<TYPE>()?;
@@ -43,7 +45,8 @@ fn chunk(bytes: &[u8], at: usize) -> Option<([u8; TYPE], usize)> {
     Some((*kind, LENGTH + TYPE + contents))
 }
 
-/// Returns whether every palette has from 1 to 256 complete colors. Chunks after the first chunk that is cut off are not read.
+/// Returns whether every palette has from 1 to 256 complete colors. Chunks after the first chunk that is cut off are
+/// not read.
 pub(super) fn has_whole_palette(bytes: &[u8]) -> bool {
     let mut rest = bytes.get(SIGNATURE..).unwrap_or_default();
     while let Some((length, after)) = rest.split_first_chunk::<LENGTH>() {

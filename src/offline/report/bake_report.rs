@@ -1,11 +1,12 @@
 //! The contents of the report of a bake.
 //!
-//! In: the results of the stages. Out: a [`BakeReport`], as JSON; the page is made of it elsewhere.
+//! In: the results of the stages. Out: a [`BakeReport`], as JSON.
 
 use super::temporal::{Activity, VarianceHistogram};
 use crate::codec::package::Section;
-use crate::offline::fine_tune::CurvePoint;
-use crate::offline::metrics::Evaluation;
+use crate::offline::measure::Evaluation;
+use crate::offline::store::stages::StageTime;
+use crate::offline::train::CurvePoint;
 use crate::view::Picture;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -27,7 +28,7 @@ pub struct BakeReport {
     pub bytes: Change<u64>,
     /// The choices of the user and of the bake, as names and values.
     pub choices: Vec<(String, String)>,
-    /// What the quality promises and the package does not keep: one sentence each.
+    /// A sentence for each promise of the quality that the package does not keep.
     pub warnings: Vec<String>,
     /// Durations of the stages, in order; the stage that writes the report is not among them.
     pub stages: Vec<StageTime>,
@@ -62,17 +63,6 @@ pub struct Change<T> {
     pub before: T,
     /// Of the package.
     pub after: T,
-}
-
-/// The duration of a stage.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct StageTime {
-    /// Its name.
-    pub name: String,
-    /// Seconds.
-    pub seconds: f64,
-    /// Whether the result of an earlier bake was used.
-    pub skipped: bool,
 }
 
 /// The size of all sections of one name.

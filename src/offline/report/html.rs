@@ -1,302 +1,81 @@
-//! The report as one HTML page.
+//! The parts of HTML that the pages of reports share.
 //!
-//! In: a [`BakeReport`]. Out: HTML with its style, its plots (SVG) and its pictures (PNG, base64) inside: it loads nothing.
+//! In: text, and parts of a page that are HTML already. Out: elements; a page with its style and its script inside,
+//! which loads nothing.
 
-use super::escape::escape;
-use super::plot::{Axis, Chart, Series, bars};
-use super::{BakeReport, Sample};
-use crate::offline::evaluation::{color_name, without_contrast};
-use crate::offline::fine_tune::CurvePoint;
-use crate::offline::metrics::MeanMetrics;
-use crate::view::Picture;
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD;
-use glam::Vec3;
-use image::codecs::png::PngEncoder;
-use image::imageops::{self, FilterType};
+/// The style of all pages.
+const STYLE: &str = include_str!("page.css");
 
-/// Largest width of the pictures, pixels.
-const PICTURE_WIDTH: u32 = 480;
-/// Factor on differences, so that they are visible.
-const GAIN: f32 = 5.0;
+/// A page.
+pub(crate) struct Page<'a> {
+    /// The title, text.
+    pub title: &'a str,
+    /// The line below the title, text.
+    pub about: &'a str,
+    /// The style besides that of all pages.
+    pub style: &'a str,
+    /// The rest of the page, HTML.
+    pub body: &'a str,
+    /// The script; empty if the page has none.
+    pub script: &'a str,
+}
 
-const STYLE: &str = "\
-:root{color-scheme:light dark;--page:#f7f7f8;--card:#fff;--ink:#1f2328;--soft:#656d76;--line:#d5d9de;\
---c0:#2f6fb3;--c1:#d0662a;--c2:#3c8d58;--c3:#8257b0;--c4:#b03a5b;--c5:#6b7a3a}\
-@media (prefers-color-scheme:dark){:root{--page:#17191c;--card:#1f2226;--ink:#e2e5e9;--soft:#949ca6;--line:#3a3f46;\
---c0:#6ea8e0;--c1:#e8935f;--c2:#74bd8c;--c3:#b394da;--c4:#e07f9b;--c5:#b3c07a}}\
-body{margin:0;background:var(--page);color:var(--ink);font:15px/1.5 system-ui,sans-serif}\
-main{max-width:1180px;margin:0 auto;padding:28px 20px 60px}h1{font-size:24px;margin:0 0 4px}h2{font-size:16px;margin:0 0 8px}\
-p{margin:0 0 12px}.soft,figcaption{color:var(--soft);font-size:13px}\
-.cards{display:grid;grid-template-columns:repeat(auto-fit,minmax(340px,1fr));gap:16px;margin-top:16px}\
-.card{background:var(--card);border:1px solid var(--line);border-radius:8px;padding:16px;overflow-x:auto}.wide{grid-column:1/-1}\
-table{border-collapse:collapse;width:100%}td,th{padding:3px 10px 3px 0;text-align:right;border-bottom:1px solid var(--line)}\
-td:first-child,th:first-child{text-align:left}th{color:var(--soft);font-weight:500}td.words{text-align:left}\
-svg{width:100%;height:auto;display:block}.text{fill:var(--soft);font-size:12px}.grid{stroke:var(--line);stroke-width:.6}\
-.axis{stroke:var(--soft);stroke-width:1}.line{fill:none;stroke-width:2}.key{margin-right:14px;font-size:13px;white-space:nowrap}\
-.key i{display:inline-block;width:14px;height:3px;margin-right:5px;vertical-align:middle}\
-.s0{stroke:var(--c0)}.s1{stroke:var(--c1)}.s2{stroke:var(--c2)}.s3{stroke:var(--c3)}.s4{stroke:var(--c4)}.s5{stroke:var(--c5)}\
-i.s0,.bar.s0{background:var(--c0);fill:var(--c0)}i.s1{background:var(--c1)}i.s2{background:var(--c2)}i.s3{background:var(--c3)}\
-i.s4{background:var(--c4)}i.s5{background:var(--c5)}.dot{fill:var(--card);stroke-width:2}\
-.views{display:grid;grid-template-columns:repeat(4,1fr);gap:8px;margin-bottom:12px}figure{margin:0}img{width:100%;display:block}";
-
-impl BakeReport {
-    /// Returns the HTML page.
-    pub fn html(&self) -> String {
-        page(self)
+impl Page<'_> {
+    /// Returns the page.
+    pub(crate) fn html(&self) -> String {
+        let Self { style, body, .. } = self;
+        let (title, about) = (escape(self.title), paragraph("soft", self.about));
+        let script = if self.script.is_empty() { String::new() } else { element("script", "", self.script) };
+        format!(
+            "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
+             <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"><title>{title}</title>\
+             <style>{STYLE}{style}</style></head>\
+             <body><main><h1>{title}</h1>{about}{body}</main>{script}</body></html>\n"
+        )
     }
 }
 
-/// Returns the whole page.
-fn page(report: &BakeReport) -> String {
-    let name = escape(&report.package);
-    let cards: String = [
-        warnings(report),
-        card("In short", "", &in_short(report)),
-        card("Choices", "", &choices(report)),
-        sections(report),
-        trials(report),
-        fine_tuning(report),
-        variances(report),
-        activity(report),
-        overlap(report),
-        card("Stages", "", &stages(report)),
-        samples(&report.samples),
-    ]
-    .concat();
-    format!(
-        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
-         <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"><title>{name}</title><style>{STYLE}</style>\
-         </head><body><main><h1>{name}</h1><p class=\"soft\">baked from {} with the views of {} by {}</p>\
-         <div class=\"cards\">{cards}</div></main></body></html>\n",
-        escape(&report.checkpoint),
-        escape(&report.data),
-        escape(&report.generator),
-    )
+/// Escapes the special characters of HTML.
+pub(crate) fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-fn card(title: &str, note: &str, body: &str) -> String {
-    let note = if note.is_empty() { String::new() } else { format!("<p class=\"soft\">{}</p>", escape(note)) };
-    format!("<section class=\"card\"><h2>{}</h2>{note}{body}</section>", escape(title))
+/// Returns an element of these classes, separated by spaces, with HTML in it.
+pub(crate) fn element(tag: &str, classes: &str, body: &str) -> String {
+    match classes {
+        "" => format!("<{tag}>{body}</{tag}>"),
+        _ => format!("<{tag} class=\"{classes}\">{body}</{tag}>"),
+    }
 }
 
-/// Returns a card with the warnings; nothing if there are none.
-fn warnings(report: &BakeReport) -> String {
-    let paragraphs: String = report.warnings.iter().map(|warning| format!("<p>{}</p>", escape(warning))).collect();
-    if paragraphs.is_empty() { paragraphs } else { card("Warnings", "", &paragraphs) }
+/// Returns a paragraph of these classes.
+pub(crate) fn paragraph(classes: &str, text: &str) -> String {
+    element("p", classes, &escape(text))
 }
 
-fn table(heads: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
-    let cells = |tag: &str, cells: Vec<String>| -> String {
-        let cells: String = cells.iter().map(|cell| format!("<{tag}>{}</{tag}>", escape(cell))).collect();
-        format!("<tr>{cells}</tr>")
-    };
-    let head = cells("th", heads.iter().map(ToString::to_string).collect());
-    let body: String = rows.into_iter().map(|row| cells("td", row)).collect();
-    format!("<table>{head}{body}</table>")
+/// Returns a card of these classes: a title, and HTML below it.
+pub(crate) fn card(classes: &str, title: &str, body: &str) -> String {
+    element("section", format!("card {classes}").trim_end(), &(element("h2", "", &escape(title)) + body))
 }
 
-fn in_short(report: &BakeReport) -> String {
-    let row = |name: &str, before: String, after: String| vec![name.to_owned(), before, after];
-    let (count, bytes) = (report.gaussians, report.bytes);
-    let each = |bytes: u64, count: usize| format!("{:.1}", bytes as f64 / count.max(1) as f64);
-    let mut rows = vec![
-        row("Gaussians", count.before.to_string(), count.after.to_string()),
-        row("MB", megabytes(bytes.before), megabytes(bytes.after)),
-        row("bytes per Gaussian", each(bytes.before, count.before), each(bytes.after, count.after)),
-    ];
-    if let Some(evaluation) = &report.evaluation {
-        let (before, after) = (&evaluation.before.mean, &evaluation.after.mean);
-        let mut metric = |name: &str, digits: usize, of: fn(&MeanMetrics) -> Option<f64>| {
-            if let (Some(before), Some(after)) = (of(before), of(after)) {
-                rows.push(row(name, format!("{before:.digits$}"), format!("{after:.digits$}")));
-            }
-        };
-        metric("PSNR, dB", 2, |l| Some(l.psnr));
-        metric("PSNR pooled, dB", 2, |l| Some(l.psnr_pooled));
-        metric("SSIM", 4, |l| l.ssim);
-        metric("MS-SSIM", 4, |l| l.ms_ssim);
-        metric("FLIP (0 is best)", 4, |l| l.flip);
-        if let (Some(before), Some(after)) = (evaluation.before.contrast, evaluation.after.contrast) {
-            let (over, before, after) = (color_name(after.background), before.mean, after.mean);
-            let mut metric = |name: &str, before: f64, after: f64| {
-                rows.push(row(&format!("{name} over {over}, dB"), format!("{before:.2}"), format!("{after:.2}")));
-            };
-            metric("PSNR", before.psnr, after.psnr);
-            metric("PSNR pooled", before.psnr_pooled, after.psnr_pooled);
+/// Returns a table of the cells of its head and the cells of each row, HTML.
+pub(crate) fn table(head: &str, rows: impl IntoIterator<Item = String>) -> String {
+    let rows: String = rows.into_iter().collect();
+    element("table", "", &(element("thead", "", &element("tr", "", head)) + &element("tbody", "", &rows)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_is_escaped_and_html_is_not() {
+        let body = card("wide", "<a>", &table("<th>b</th>", ["<tr></tr>".to_owned()]));
+        let page = Page { title: "<c>", about: "\"d\" & e", style: "", body: &body, script: "" }.html();
+        for text in ["<title>&lt;c&gt;</title>", "<p class=\"soft\">&quot;d&quot; &amp; e</p>", "<h2>&lt;a&gt;</h2>"] {
+            assert!(page.contains(text), "{text}: {page}");
         }
+        let table = "<table><thead><tr><th>b</th></tr></thead><tbody><tr></tr></tbody></table>";
+        assert!(page.contains(&format!("{table}</section></main></body>")), "the table in its card: {page}");
     }
-    let about = match (&report.evaluation, &report.split) {
-        (Some(evaluation), Some(split)) => {
-            let after = &evaluation.after;
-            let behind = match after.contrast {
-                Some(_) => format!("Where no background is named, it is {}.", color_name(after.background)),
-                None => format!("One background: {}.", without_contrast(after)),
-            };
-            let identical = |name: &str, mean: &MeanMetrics| {
-                mean.identical_in_words("views").map_or(String::new(), |words| format!(" Of the {name}, {words}."))
-            };
-            format!(
-                "Metrics: means over the {} views of the {split} split; pooled is the PSNR of all values of all views together. \
-                 {behind}{}{}",
-                after.views.len(),
-                identical("checkpoint", &evaluation.before.mean),
-                identical("package", &after.mean),
-            )
-        }
-        _ => "Metrics were not measured: the images of the test split are not there.".to_owned(),
-    };
-    table(&["", "checkpoint", "package"], rows) + &format!("<p class=\"soft\">{}</p>", escape(&about))
-}
-
-fn choices(report: &BakeReport) -> String {
-    table(&["", ""], report.choices.iter().map(|(name, value)| vec![name.clone(), value.clone()]))
-}
-
-fn stages(report: &BakeReport) -> String {
-    let took = |skipped, seconds: f64| if skipped { "done before".to_owned() } else { format!("{seconds:.1}") };
-    table(&["stage", "seconds"], report.stages.iter().map(|s| vec![s.name.clone(), took(s.skipped, s.seconds)]))
-}
-
-fn sections(report: &BakeReport) -> String {
-    let all: u64 = report.sections.iter().map(|section| section.bytes).sum();
-    let row = |section: &super::SectionSize| {
-        let share = 100.0 * section.bytes as f64 / all.max(1) as f64;
-        (section.name.clone(), section.bytes as f64, format!("{} MB, {share:.0} %", megabytes(section.bytes)))
-    };
-    let rows: Vec<_> = report.sections.iter().map(row).collect();
-    card("Size by section", "Bytes in the package, compressed.", &bars(&rows))
-}
-
-fn trials(report: &BakeReport) -> String {
-    let mut series: Vec<Series> = Vec::new();
-    for trial in &report.trials {
-        let point = [100.0 * trial.ratio, trial.psnr];
-        match series.iter_mut().find(|s| s.name == trial.variant) {
-            Some(series) => series.points.push(point),
-            None => series.push(Series { name: trial.variant.clone(), points: vec![point], dots: true }),
-        }
-    }
-    if series.is_empty() {
-        return String::new();
-    }
-    series.iter_mut().for_each(|s| s.points.sort_by(|a, b| a[0].total_cmp(&b[0])));
-    let chart = Chart { x: Axis::new("removed, %"), y: Axis::new("PSNR, dB"), series };
-    let note = "Held-out training views, drawn from what each score keeps, before any fine-tuning.";
-    plotted("PSNR against prune ratio", note, &chart)
-}
-
-fn fine_tuning(report: &BakeReport) -> String {
-    let curve = &report.fine_tuning;
-    if curve.is_empty() {
-        return String::new();
-    }
-    let line = |name: &str, psnr: fn(&CurvePoint) -> Option<f64>| Series {
-        name: name.to_owned(),
-        points: curve.iter().filter_map(|point| Some([point.step as f64, psnr(point)?])).collect(),
-        dots: true,
-    };
-    let series = vec![line("validation views", |point| point.psnr), line("views trained on", |p| p.training_psnr)];
-    let chart = Chart { x: Axis::new("steps"), y: Axis::new("PSNR, dB"), series };
-    plotted("Fine-tuning", "Training views, before compression. Those trained on are over random backgrounds.", &chart)
-}
-
-fn variances(report: &BakeReport) -> String {
-    let histogram = &report.variances;
-    let middle = |i: usize| (histogram.borders[i] * histogram.borders[i + 1]).sqrt();
-    let line = |name: &str, shares: &[f64]| Series {
-        name: name.to_owned(),
-        points: shares.iter().enumerate().map(|(i, share)| [middle(i), 100.0 * share]).collect(),
-        dots: false,
-    };
-    let chart = Chart {
-        x: Axis { log: true, ..Axis::new("temporal variance Σt, timestamp units squared") },
-        y: Axis::new("Gaussians, %"),
-        series: vec![line("checkpoint", &histogram.before), line("package", &histogram.after)],
-    };
-    plotted("Temporal variance", "Small variances flash by, large ones stay.", &chart)
-}
-
-fn activity(report: &BakeReport) -> String {
-    let mut series = vec![
-        percent_line(report, "checkpoint", &report.activity.before.share),
-        percent_line(report, "package", &report.activity.after.share),
-    ];
-    if let Some(shares) = &report.filter_share {
-        series.push(percent_line(report, "package, let through by the filter", shares));
-    }
-    let chart = Chart { x: Axis::new("time"), y: Axis { range: Some([0.0, 100.0]), ..Axis::new("active, %") }, series };
-    plotted("Active ratio over time", "Share of the Gaussians whose marginal exceeds 0.05 at that time.", &chart)
-}
-
-fn overlap(report: &BakeReport) -> String {
-    let series = vec![
-        percent_line(report, "checkpoint", &report.activity.before.overlap),
-        percent_line(report, "package", &report.activity.after.overlap),
-    ];
-    let chart = Chart { x: Axis::new("time"), y: Axis { range: Some([0.0, 100.0]), ..Axis::new("IoU, %") }, series };
-    plotted("IoU of active sets over time", "The set active at each time against the set active at the first.", &chart)
-}
-
-fn percent_line(report: &BakeReport, name: &str, shares: &[f64]) -> Series {
-    let points = report.times.iter().zip(shares).map(|(&time, share)| [f64::from(time), 100.0 * share]);
-    Series { name: name.to_owned(), points: points.collect(), dots: false }
-}
-
-fn plotted(title: &str, note: &str, chart: &Chart) -> String {
-    card(title, note, &(chart.svg() + "<p>" + &chart.legend() + "</p>"))
-}
-
-fn samples(samples: &[Sample]) -> String {
-    if samples.is_empty() {
-        return String::new();
-    }
-    let view = |sample: &Sample| {
-        let difference = difference(&sample.reference, &sample.after);
-        let figures: String = [
-            ("reference", &sample.reference),
-            ("checkpoint", &sample.before),
-            ("package", &sample.after),
-            ("difference of the package, x 5", &difference),
-        ]
-        .into_iter()
-        .map(|(what, picture)| {
-            let (name, data) = (escape(&sample.name), png_data(picture));
-            format!(
-                "<figure><img src=\"{data}\" alt=\"{name}, {what}\"><figcaption>{name}: {what}</figcaption></figure>"
-            )
-        })
-        .collect();
-        format!("<div class=\"views\">{figures}</div>")
-    };
-    let views: String = samples.iter().map(view).collect();
-    format!("<section class=\"card wide\"><h2>Views</h2>{views}</section>")
-}
-
-/// Returns the absolute difference of two pictures of one size, times [`GAIN`].
-fn difference(a: &Picture, b: &Picture) -> Picture {
-    let pixels = a
-        .pixels
-        .iter()
-        .zip(&b.pixels)
-        .map(|(p, q)| ((*p - q.clamp(Vec3::ZERO, Vec3::ONE)).abs() * GAIN).min(Vec3::ONE));
-    Picture { size: a.size, pixels: pixels.collect() }
-}
-
-/// Returns a picture as the source of an `img`; empty if it cannot be encoded.
-fn png_data(picture: &Picture) -> String {
-    let mut image = picture.to_rgb8();
-    if image.width() > PICTURE_WIDTH {
-        let height = (f64::from(image.height()) * f64::from(PICTURE_WIDTH) / f64::from(image.width())).round().max(1.0);
-        image = imageops::resize(&image, PICTURE_WIDTH, height as u32, FilterType::Triangle);
-    }
-    let mut png = Vec::new();
-    match image.write_with_encoder(PngEncoder::new(&mut png)) {
-        Ok(()) => format!("data:image/png;base64,{}", STANDARD.encode(png)),
-        Err(_) => String::new(),
-    }
-}
-
-fn megabytes(bytes: u64) -> String {
-    format!("{:.2}", bytes as f64 / 1e6)
 }

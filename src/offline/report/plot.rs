@@ -1,20 +1,22 @@
 //! Plots as inline SVG.
 //!
-//! In: numbers with names. Out: SVG text without any style: classes `s0`, `s1`, … color the series, `axis`, `grid` and
-//! `text` the rest, so that the style of the page applies.
+//! In: numbers with names. Out: SVG without a style of its own: the style of the page applies to the classes `s0`,
+//! `s1`, … of the series, `axis`, `grid` and `text`.
 
+use super::html::escape;
 use std::fmt::Write;
 
-use super::escape::escape;
-
+/// Width of a drawing. All lengths and positions are in units of the drawing.
 const WIDTH: f64 = 560.0;
+/// Height of a plot.
 const HEIGHT: f64 = 300.0;
 /// Room around the plot area: left, top, right, bottom.
 const MARGIN: [f64; 4] = [58.0, 12.0, 14.0, 44.0];
 /// Height of a bar with its gap.
 const BAR: f64 = 26.0;
-/// Room for the name of a bar and for its value.
+/// Room for the name of a bar.
 const BAR_NAME: f64 = 150.0;
+/// Room for the value of a bar.
 const BAR_VALUE: f64 = 120.0;
 
 /// A plot of lines.

@@ -1,7 +1,7 @@
 //! Activity of Gaussians over time: the data of the three plots in the paper's Figure 2.
 //!
-//! In: runtime Gaussians before and after. Out: the distribution of their temporal variances, the fraction that is active at each time, and the
-//! overlap of each active set with the first set.
+//! In: runtime Gaussians before and after a bake. Out: the distribution of their temporal variances, the fraction that
+//! is active at each time, and the overlap of each active set with the first set.
 
 use crate::gaussian::Gaussian;
 use crate::scene::TemporalFilter;

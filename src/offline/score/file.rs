@@ -3,7 +3,7 @@
 //! In: a path, and the scores or the number of Gaussians. Out: the file, or its scores.
 
 use crate::codec::CodecError;
-use crate::offline::{OfflineError, write_beside};
+use crate::offline::work::{FileError, write_beside};
 use std::fs;
 use std::io::Write;
 use std::path::Path;
@@ -21,19 +21,19 @@ pub fn write_scores(path: &Path, scores: &[f32]) -> Result<(), CodecError> {
 ///
 /// # Errors
 /// A file that cannot be read, has another length, or has a value that is not finite.
-pub fn read_scores(path: &Path, count: usize) -> Result<Vec<f32>, OfflineError> {
-    let bytes = fs::read(path).map_err(|error| OfflineError::at(path, error))?;
+pub fn read_scores(path: &Path, count: usize) -> Result<Vec<f32>, FileError> {
+    let bytes = fs::read(path).map_err(|error| FileError::at(path, error))?;
     if bytes.len() != count * 4 {
         let found = bytes.len();
         let message = format!(
             "{found} bytes, but scores of {count} Gaussians have {}: was it made from another checkpoint?",
             count * 4
         );
-        return Err(OfflineError::at(path, message));
+        return Err(FileError::at(path, message));
     }
     let scores = floats(&bytes);
     match scores.iter().position(|score| !score.is_finite()) {
-        Some(index) => Err(OfflineError::at(path, format!("the score of Gaussian {index} is not finite"))),
+        Some(index) => Err(FileError::at(path, format!("the score of Gaussian {index} is not finite"))),
         None => Ok(scores),
     }
 }
@@ -42,15 +42,15 @@ pub fn read_scores(path: &Path, count: usize) -> Result<Vec<f32>, OfflineError> 
 ///
 /// # Errors
 /// A file that cannot be read, has another length, or has a value that is negative or not finite.
-pub fn read_weights(path: &Path, count: usize) -> Result<Vec<f32>, OfflineError> {
-    let bytes = fs::read(path).map_err(|error| OfflineError::at(path, error))?;
+pub fn read_weights(path: &Path, count: usize) -> Result<Vec<f32>, FileError> {
+    let bytes = fs::read(path).map_err(|error| FileError::at(path, error))?;
     let weights = floats(&bytes);
     if bytes.len() != count * 4 {
         let reason = format!("holds {} scores for a scene of {count} Gaussians", weights.len());
-        return Err(OfflineError::at(path, reason));
+        return Err(FileError::at(path, reason));
     }
     if !weights.iter().all(|weight| weight.is_finite() && *weight >= 0.0) {
-        return Err(OfflineError::at(path, "holds a score that is negative or not finite"));
+        return Err(FileError::at(path, "holds a score that is negative or not finite"));
     }
     Ok(weights)
 }

@@ -1,12 +1,13 @@
 //! Scoring views on the GPU, with the renderer's own passes.
 //!
-//! In: a finished frame of a [`Headless`] renderer. Out: the contribution of each Gaussian to the frame ([`ViewScore`]), summed without float
-//! atomics, so that every run gives the same result.
+//! In: a finished frame of a [`Headless`] renderer. Out: the contribution of each Gaussian to the frame
+//! ([`ViewScore`]), summed without float atomics, so that every run gives the same result.
 
 use super::{ScoreEngine, ScoreError, ViewScore, Want};
-use crate::offline::shaders::SHADERS;
-use crate::renderer::bind::{Bind, group_layout, pipeline};
-use crate::renderer::memory::{Allocator, binding_limit};
+use crate::offline::engine::EngineError;
+use crate::offline::engine::shaders::SHADERS;
+use crate::renderer::device::bind::{Bind, group_layout, pipeline};
+use crate::renderer::device::memory::{Allocator, binding_limit};
 use crate::renderer::{GpuCapture, GpuContext, GpuError, Headless, ShaderChecks, layout};
 use crate::scene::RuntimeScene;
 use crate::view::{Background, View};
@@ -83,7 +84,7 @@ impl Scorer {
         let Some(frame) = headless.finished() else { return Err(GpuError::Device("nothing was drawn".into())) };
         let buffers = match self.buffers.take() {
             Some(made) if (made.slots, made.pairs) == (frame.slots, frame.pairs) => made,
-            _ => self.make(headless.allocator(), frame.slots, frame.pairs)?,
+            _ => self.new_buffers(headless.allocator(), frame.slots, frame.pairs)?,
         };
         let buffers = self.buffers.insert(buffers);
         let inputs = [
@@ -121,7 +122,7 @@ impl Scorer {
     }
 
     /// Creates the buffers for these numbers of slots and pairs.
-    fn make(&self, allocator: Allocator<'_>, slots: u32, pairs: u32) -> Result<Buffers, GpuError> {
+    fn new_buffers(&self, allocator: Allocator<'_>, slots: u32, pairs: u32) -> Result<Buffers, GpuError> {
         let limit = binding_limit(&allocator.device.limits());
         let needed = u64::from(pairs) * 16;
         if needed > limit {
@@ -167,8 +168,6 @@ impl<'a> GpuEngine<'a> {
 impl ScoreEngine for GpuEngine<'_> {
     /// Always computes all sums: `want` has no effect.
     fn score(&mut self, view: &View, _want: Want) -> Result<ViewScore, ScoreError> {
-        self.scorer
-            .score(self.headless, &self.capture, view, self.background)
-            .map_err(|error| ScoreError::Engine(Box::new(error)))
+        Ok(self.scorer.score(self.headless, &self.capture, view, self.background).map_err(EngineError::from)?)
     }
 }

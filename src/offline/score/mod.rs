@@ -4,31 +4,34 @@
 //! pass over the views, summed in double precision.
 
 pub(crate) mod engine;
+mod error;
 pub(crate) mod file;
 pub(crate) mod gpu;
 pub(crate) mod parts;
 pub(crate) mod reference;
+mod scorer;
 mod scoring;
 mod sums;
 mod total;
 pub(crate) mod traits;
 mod variant;
 
-pub(in crate::offline) use engine::INTERRUPTED;
-pub use engine::ScoreError;
-pub(crate) use engine::{CpuEngine, ScoreEngine};
+pub(crate) use engine::ScoreEngine;
+pub use error::ScoreError;
 pub(crate) use file::read_weights;
 pub use file::{read_scores, write_scores};
 pub(crate) use gpu::GpuEngine;
 pub(crate) use reference::{ViewScore, Want};
+pub(crate) use scorer::scorer;
 pub use scoring::ScoringSettings;
 pub use traits::ScoreSettings;
 pub(crate) use traits::Traits;
 pub use variant::{UnknownVariant, Variant};
 
-use super::shard::Shard;
-use super::stored::Stored;
-use super::{OfflineError, Progress};
+use crate::offline::store::StoreError;
+use crate::offline::store::shard::Shard;
+use crate::offline::store::stored::Stored;
+use crate::offline::work::{Progress, proceed};
 use crate::view::View;
 use rayon::prelude::*;
 use sums::{BYTES, Sums};
@@ -71,7 +74,8 @@ impl Scores {
         Self::of_shard(engine, traits, views, settings, Shard::WHOLE, progress)?.whole()
     }
 
-    /// Scores the views of a shard: some of the times with all their views. The scores of all shards are [merged](Self::merge).
+    /// Scores the views of a shard: some of the times with all their views. The scores of all shards are
+    /// [merged](Self::merge).
     ///
     /// # Errors
     /// No views at all, a failure of the engine.
@@ -89,13 +93,11 @@ impl Scores {
         let factors = traits.volume_factors(settings);
         let weights = |index: usize| factors.as_ref().map_or(1.0, |factors| factors[index]);
         let mut sums = vec![Sums::default(); traits.moments.len()];
-        let moments = moments(views, shard);
-        for moment in &moments {
+        let groups = by_time(views, shard);
+        for group in &groups {
             let mut contribution = vec![0.0; sums.len()];
-            for view in moment {
-                if progress.is_interrupted() {
-                    return Err(ScoreError::Interrupted);
-                }
+            for view in group {
+                proceed(progress)?;
                 let score = engine.score(view, Want::Removal)?;
                 add(&mut contribution, &score.contribution);
                 sums.par_iter_mut().zip(&score.energy).zip(&score.removal).for_each(|((sum, &energy), &removal)| {
@@ -103,12 +105,12 @@ impl Scores {
                 });
                 progress.advance();
             }
-            let (time, count) = (f64::from(moment[0].time), moment.len() as f64);
+            let (time, count) = (f64::from(group[0].time), group.len() as f64);
             sums.par_iter_mut().enumerate().for_each(|(index, sum)| {
-                sum.add_moment(time, count, traits.moments[index], weights(index), contribution[index]);
+                sum.add_time(time, count, traits.moments[index], weights(index), contribution[index]);
             });
         }
-        Ok(Self { sums, has_volume: factors.is_some(), views: moments.iter().map(Vec::len).sum() })
+        Ok(Self { sums, has_volume: factors.is_some(), views: groups.iter().map(Vec::len).sum() })
     }
 
     /// Adds the scores of another shard with the same inputs.
@@ -117,7 +119,7 @@ impl Scores {
         self.views += other.views;
     }
 
-    /// Returns these scores, which are those of all shards.
+    /// Checks the scores of all shards, and returns them.
     ///
     /// # Errors
     /// Views that show nothing of the scene.
@@ -130,7 +132,7 @@ impl Scores {
 
     /// Returns the number of views that a shard scores.
     pub(super) fn count(views: &[View], shard: Shard) -> usize {
-        moments(views, shard).iter().map(Vec::len).sum()
+        by_time(views, shard).iter().map(Vec::len).sum()
     }
 
     /// Returns the number of views that were scored.
@@ -170,13 +172,13 @@ impl Scores {
     }
 }
 
-/// Returns the views of a shard by time, those of one time together. Times ascend.
-fn moments(views: &[View], shard: Shard) -> Vec<Vec<View>> {
+/// Returns the views of a shard in groups of one time each. Times ascend.
+fn by_time(views: &[View], shard: Shard) -> Vec<Vec<View>> {
     let mut views = views.to_vec();
     views.sort_by(|a, b| a.time.total_cmp(&b.time));
-    let moments: Vec<Vec<View>> = views.chunk_by(|a, b| a.time == b.time).map(<[View]>::to_vec).collect();
-    let counts: Vec<usize> = moments.iter().map(Vec::len).collect();
-    shard.share(&counts).into_iter().filter_map(|index| moments.get(index).cloned()).collect()
+    let groups: Vec<Vec<View>> = views.chunk_by(|a, b| a.time == b.time).map(<[View]>::to_vec).collect();
+    let counts: Vec<usize> = groups.iter().map(Vec::len).collect();
+    shard.share(&counts).into_iter().filter_map(|index| groups.get(index).cloned()).collect()
 }
 
 fn add(sums: &mut [f64], values: &[f32]) {
@@ -187,7 +189,7 @@ fn add(sums: &mut [f64], values: &[f32]) {
 
 /// Whether the volume is known (a byte) and the number of views, then the sums of each Gaussian.
 impl Stored for Scores {
-    fn encode(&self) -> Result<Vec<u8>, OfflineError> {
+    fn encode(&self) -> Result<Vec<u8>, StoreError> {
         let mut bytes = Vec::with_capacity(self.bytes());
         bytes.push(u8::from(self.has_volume));
         bytes.extend((self.views as u64).to_le_bytes());

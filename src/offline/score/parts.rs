@@ -1,14 +1,17 @@
-//! Scores in parts: one for each shard, and all of them again.
+//! Scores in parts, one for each shard, and their merge.
 //!
-//! In: a scene, the views to score with, an [`Engine`], a shard; or the paths of parts. Out: the file of a part, or the [`Scores`] of all.
+//! In: a scene, the views to score with, an [`Engine`], a shard; or the paths of parts. Out: the file of a part, or the
+//! [`Scores`] of all.
 
 use super::{ScoreError, Scores, ScoringSettings};
 use crate::offline::dataset::TrainingView;
 use crate::offline::engine::Engine;
-use crate::offline::shard::{Label, Shard, part, parts};
-use crate::offline::store::Key;
-use crate::offline::stored::Stored;
-use crate::offline::{OfflineError, Progress, Subject};
+use crate::offline::forms::Subject;
+use crate::offline::store::StoreError;
+use crate::offline::store::results::Key;
+use crate::offline::store::shard::{Label, Shard, part, parts};
+use crate::offline::store::stored::Stored;
+use crate::offline::work::{FileError, Progress};
 use std::path::{Path, PathBuf};
 
 /// Most bytes of a part whose scene is not known: sums of a hundred million Gaussians.
@@ -25,7 +28,7 @@ pub(crate) fn label(
     settings: &ScoringSettings,
     engine: &Engine,
     shard: Shard,
-) -> Result<Label, OfflineError> {
+) -> Result<Label, StoreError> {
     let Subject { scene, background, .. } = subject;
     let ScoringSettings { views: count, score } = settings;
     let read = format!("{:?} {:?} {background:?}", scene.trained_with, scene.playback);
@@ -34,8 +37,8 @@ pub(crate) fn label(
         .with("reading of the checkpoint", Key::of(read.as_bytes()))
         .with("set of training views", Key::of_views(views))
         .with("number of views", count.map_or("all".to_owned(), |count| count.to_string()))
-        .with("--volume-power", score.volume_power)
-        .with("--volume-rank", score.volume_rank)
+        .with("power of the volume", score.volume_power)
+        .with("rank of the volume", score.volume_rank)
         .with("engine", engine.kind()))
 }
 
@@ -51,7 +54,7 @@ pub(crate) fn write(
     subject: &Subject,
     views: &[TrainingView],
     progress: &mut dyn Progress,
-) -> Result<bool, OfflineError> {
+) -> Result<bool, ScoreError> {
     if part::is_there(out, label) {
         return Ok(false);
     }
@@ -60,24 +63,23 @@ pub(crate) fn write(
     Ok(true)
 }
 
-/// Reads parts and puts their scores together. The parts must have the inputs of `expected`, or else those of the first part.
+/// Reads parts and merges their scores. The parts must have the inputs of `expected`, or else those of the first part.
 ///
 /// # Errors
 /// As `parts::in_order`, files that cannot be read, views that show nothing of the scene.
-pub fn merge(paths: &[PathBuf], expected: Option<&Label>) -> Result<Scores, OfflineError> {
+pub fn merge(paths: &[PathBuf], expected: Option<&Label>) -> Result<Scores, ScoreError> {
     let (paths, _) = parts::in_order(paths, expected)?;
     let mut merged: Option<Scores> = None;
     for path in &paths {
         let most = merged.as_ref().map_or(MOST, Scores::bytes);
         let scores = Scores::decode(&part::result(path, most)?);
         let fits = |scores: &Scores| merged.as_ref().is_none_or(|merged| merged.len() == scores.len());
-        let scores = scores.filter(fits).ok_or_else(|| {
-            OfflineError::at(path, "does not hold the sums of the scores of this scene: make it again with --shard")
-        })?;
+        let message = "does not hold the sums of the scores of this scene: make it again";
+        let scores = scores.filter(fits).ok_or_else(|| FileError::at(path, message))?;
         match &mut merged {
             Some(merged) => merged.merge(&scores),
             None => merged = Some(scores),
         }
     }
-    Ok(merged.ok_or(ScoreError::NoViews)?.whole()?)
+    merged.ok_or(ScoreError::NoViews)?.whole()
 }

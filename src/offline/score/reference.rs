@@ -22,17 +22,17 @@ pub enum Want {
     Removal,
 }
 
-/// The contributions of every Gaussian of a scene to one picture, in the order of the scene; 0 for Gaussians that are not blended. Default:
-/// empty.
+/// The contributions of every Gaussian of a scene to one picture, in the order of the scene; 0 for Gaussians that are
+/// not blended. Default: empty.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ViewScore {
     /// Σ c over pixels. Above 0 if and only if the Gaussian was blended into a pixel.
     pub contribution: Vec<f32>,
     /// Σ c² over pixels.
     pub energy: Vec<f32>,
-    /// Σ (c (color − B))² over pixels and channels, B the color behind the Gaussian at that pixel, background included: the squared change of the
-    /// picture if the Gaussian were removed. Exact at pixels that do not stop early.
-    /// Empty with [`Want::Contribution`].
+    /// Σ (c (color − B))² over pixels and channels, B the color behind the Gaussian at that pixel, background included:
+    /// the squared change of the picture if the Gaussian were removed. Exact at pixels that do not stop early. Empty
+    /// with [`Want::Contribution`].
     pub removal: Vec<f32>,
 }
 
@@ -148,7 +148,8 @@ impl Tile {
         }
     }
 
-    /// Blends the splats of the tile in order, each into all pixels that it reaches. Calls `each` with the index of the pair.
+    /// Blends the splats of the tile in order, each into all pixels that it reaches. Calls `each` with the index of the
+    /// pair.
     fn blend(mut self, splats: &[Splat], pairs: &[Pair], mut each: impl FnMut(usize, &Splat, &Blended)) -> Self {
         for (number, pair) in pairs.iter().enumerate() {
             if self.live.iter().all(|&live| live == 0) {
@@ -203,7 +204,8 @@ impl Tile {
     }
 }
 
-/// The region in which the alpha of a splat can reach 1/255: an ellipse. Pixels outside are skipped, pixels inside are tested.
+/// The region in which the alpha of a splat can reach 1/255: an ellipse. Pixels outside are skipped, pixels inside are
+/// tested.
 struct Reach {
     center: f64,
     /// [Factored](crate::gaussian::conic).

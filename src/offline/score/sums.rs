@@ -1,7 +1,7 @@
 //! The sums of one Gaussian over views, from which every score derives.
 //!
-//! In: the contribution of the Gaussian to the views of one time, to each view, or the sums of another shard. Out: the sums, a score, their
-//! bytes.
+//! In: the contribution of the Gaussian to the views of one time, to each view, or the sums of another shard. Out: the
+//! sums, a score, their bytes.
 
 use super::Variant;
 use super::total::Total;
@@ -22,14 +22,14 @@ pub(super) struct Sums {
     removal: Total,
 }
 
-/// Number of values of [`Sums::to_array`].
+/// Number of values of [`Sums::to_bytes`].
 const VALUES: usize = 20;
 /// Bytes of the sums of a Gaussian.
 pub(super) const BYTES: usize = VALUES * size_of::<f64>();
 
 impl Sums {
     /// Adds the views of one time: their number, and the sum of the contributions of the Gaussian to these views.
-    pub(super) fn add_moment(
+    pub(super) fn add_time(
         &mut self,
         time: f64,
         views: f64,
@@ -142,7 +142,7 @@ mod tests {
         for &time in times {
             let value = f64::from(time);
             sums.add_view(value.sin().abs(), value.cos().abs() * 1e-3);
-            sums.add_moment(value, 3.0, [0.3, 0.7], 1.1, (value * 7.3).sin().abs() * 1e5);
+            sums.add_time(value, 3.0, [0.3, 0.7], 1.1, (value * 7.3).sin().abs() * 1e5);
         }
         sums
     }

@@ -1,10 +1,10 @@
 //! Sums in twice the precision of a float64.
 //!
-//! In: numbers that are not negative, in any order, or sums of them. Out: their sum. It is rounded to a float64 once, at the end, so that it
-//! does not depend on how the numbers are divided into shards (but for a total within about 2⁻¹⁰⁰ of its size of the middle between two
-//! float64).
+//! In: numbers that are not negative, in any order, or sums of them. Out: their sum. It is rounded to a float64 once,
+//! at the end, so that it does not depend on how the numbers are divided into shards, unless it is closer than about
+//! 2⁻¹⁰⁰ of its size to the middle between two float64.
 
-/// A sum: `sum` is the total, rounded, and `rest` what the rounding left. Default: of nothing.
+/// A sum: `sum` is the rounded total, and `rest` the error of the rounding. Default: of no numbers.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Total {
     sum: f64,

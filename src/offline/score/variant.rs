@@ -53,7 +53,7 @@ impl Variant {
         Self::EnergyRemoval,
     ];
 
-    /// The variants that [`ScoreChoice::Auto`](crate::offline::search::ScoreChoice::Auto) tries: three of our own and the paper's.
+    /// The variants that an automatic choice tries: three of our own and the paper's.
     pub const AUTO: [Self; 4] = [Self::EnergyRemoval, Self::Energy, Self::Removal, Self::Full];
 
     /// Returns the name of the variant.

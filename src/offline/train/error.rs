@@ -1,60 +1,104 @@
-//! The errors of beginning a capture.
+//! The errors of `train`.
 //!
-//! In: views that no capture can be trained on. Out: [`StartError`], with the cause and the remedy.
+//! In: what is wrong, or the error of a part. Out: [`TrainError`]; a command adds the option that mends it.
 
-/// Why no capture can be begun.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum StartError {
-    /// Depth cannot be found.
-    #[error("{}: a capture needs views from several places", one_place(*.views))]
-    OnePlace {
-        /// Number of views.
-        views: usize,
+use super::results::FineTuned;
+use super::start::StartError;
+use super::trainer_error::TrainerError;
+use crate::codec::CodecError;
+use crate::gaussian::InvalidGaussian;
+use crate::offline::compress::CompressError;
+use crate::offline::dataset::DatasetError;
+use crate::offline::engine::EngineError;
+use crate::offline::measure::metrics::SizeMismatch;
+use crate::offline::score::ScoreError;
+use crate::offline::store::StoreError;
+use crate::offline::work::{FileError, Interrupted};
+use crate::renderer::GpuError;
+use std::path::PathBuf;
+
+/// Why nothing can be trained.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum TrainError {
+    /// No capture can be trained on the views of a dataset, or from a file of points.
+    #[error("{}: {reason}", .path.display())]
+    Start {
+        /// The dataset, or the file of points.
+        path: PathBuf,
+        /// Why not.
+        #[source]
+        reason: StartError,
     },
-    /// A time that is not a finite number.
-    #[error("the view {view} has no finite time")]
-    Time {
-        /// Name of the view.
-        view: String,
+    /// There is too little memory for the Gaussians that would be trained.
+    #[error(
+        "training {count} Gaussians takes up to {:.1} GB of memory, and {:.1} GB are available",
+        *.needed as f64 / 1e9, *.available as f64 / 1e9
+    )]
+    Memory {
+        /// Number of Gaussians.
+        count: u64,
+        /// Bytes needed.
+        needed: u64,
+        /// Bytes available.
+        available: u64,
     },
-    /// An interval whose ends are one number in single precision.
-    #[error("the time interval {},{} has no length in single precision: give the first and the last time of the dataset", .interval[0], .interval[1])]
-    Interval {
-        /// First and last time, as given.
-        interval: [f64; 2],
+    /// The GPU has no room for the Gaussians that would be trained.
+    #[error("{reason}")]
+    Limit {
+        /// The limit.
+        #[source]
+        reason: GpuError,
     },
-    /// The cameras look at nothing together.
-    #[error(
-        "the training cameras look away from each other, so that they have no region in common (are they inside of what they show?): give views of one \
-         scene, or begin with points: gs4d train --points FILE"
-    )]
-    NoRegion,
-    /// There are no points.
-    #[error(
-        "the dataset has no file of points (points3d.ply, sparse/0/points3D.bin, ply_file_path of transforms.json): give one with --points, or another \
-         --start"
-    )]
-    NoPoints,
-    /// There are no silhouettes.
-    #[error("the images have no transparent pixels and no masks, so that they have no hull: give --start random")]
-    NoSilhouettes,
-    /// Images that do not show what is behind the scene.
-    #[error(
-        "the images have transparent pixels or masks, which do not show what is behind the scene: leave out --environment, or give 0"
-    )]
-    NoSurroundings,
-    /// There is nothing inside the silhouettes.
-    #[error(
-        "no point is inside the silhouettes of the views of a moment (masks or poses of another scene?): if both are right, begin \
-         elsewhere: gs4d train --start random"
-    )]
-    NoHull,
+    /// Only a GPU can train.
+    #[error("training from pictures needs a GPU")]
+    WithoutGpu,
+    /// The user has interrupted the training.
+    #[error("{Interrupted}")]
+    Interrupted {
+        /// The best result so far.
+        tuned: Option<Box<FineTuned>>,
+    },
+    /// The thread that writes the package of a running training panicked.
+    #[error("the thread that writes the package panicked: a defect of gs4d, please report it")]
+    WriterPanicked,
+    /// The scene cannot be trained.
+    #[error("{0}")]
+    Trainer(#[from] TrainerError),
+    /// The GPU failed.
+    #[error("{0}")]
+    Gpu(#[from] GpuError),
+    /// Pictures are too large for the memory or the GPU.
+    #[error("{0}")]
+    Engine(#[from] EngineError),
+    /// Views, images or points cannot be used.
+    #[error("{0}")]
+    Dataset(#[from] DatasetError),
+    /// A picture and its image differ in size.
+    #[error("{0}")]
+    Size(#[from] SizeMismatch),
+    /// The temporal filter cannot be computed again.
+    #[error("{0}")]
+    Score(#[from] ScoreError),
+    /// The result cannot be compressed.
+    #[error("{0}")]
+    Compress(#[from] CompressError),
+    /// A package or a picture cannot be written.
+    #[error("{0}")]
+    Codec(#[from] CodecError),
+    /// The state cannot be stored, or an image or a file of points cannot be hashed.
+    #[error("{0}")]
+    Store(#[from] StoreError),
+    /// A file cannot be used.
+    #[error("{0}")]
+    File(#[from] FileError),
+    /// A Gaussian cannot be drawn.
+    #[error("{0}")]
+    Invalid(#[from] InvalidGaussian),
 }
 
-/// Says that there is no depth in so many views.
-fn one_place(views: usize) -> String {
-    match views {
-        1 => "a single training view has no depth".to_owned(),
-        _ => format!("all {views} training views are taken from one place, from which no depth can be found"),
+impl From<Interrupted> for TrainError {
+    fn from(_: Interrupted) -> Self {
+        Self::Interrupted { tuned: None }
     }
 }

@@ -1,0 +1,307 @@
+//! `gs4d info FILE`: shows the contents of a checkpoint or a package. For the folder of a dataset see `info_dataset`.
+//!
+//! In: a file. Out: its properties, its bounds, and for packages the sections and whether their checksums are correct.
+
+use super::info_dataset;
+use crate::cli::args::{CheckpointArgs, Given, Need, file_size};
+use crate::cli::output::failure::Failure;
+use crate::cli::output::report::{Report, switches, switches_json};
+use crate::cli::output::table::{Table, bytes, lines};
+use crate::codec;
+use crate::codec::format::Format;
+use crate::codec::package::{PackageInfo, StoredForm, StoredLevel};
+use crate::codec::text::printable;
+use crate::gaussian::Model;
+use crate::offline::dataset::{CameraOptions, Dataset};
+use crate::offline::forms::convert::form_name;
+use crate::scene::packed::MAX_STAGES;
+use crate::scene::{Bounds, ColorDegrees, GaussianScene, Level, PlaybackHints, SceneForm, TrainedWith};
+use glam::Vec3;
+use serde::Serialize;
+use serde_json::{Value, json};
+use std::collections::HashMap;
+use std::fmt;
+use std::path::PathBuf;
+
+/// Show the contents of a capture (a file, or the folder of a sequence) or a dataset (a folder), and verify all
+/// checksums of a package.
+///
+/// The exit code is 2 if a checksum is wrong or a Gaussian cannot be drawn.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  gs4d info capture.gs4d
+  gs4d info chkpnt30000.pth --time-interval 0,10 --json
+  gs4d info dataset --cameras cameras.png")]
+pub(crate) struct Info {
+    #[command(flatten)]
+    given: Given,
+    /// The capture, or the folder of a dataset.
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// Draw the cameras of a dataset into this picture, from above and from the side.
+    #[arg(long, value_name = "PICTURE.png")]
+    cameras: Option<PathBuf>,
+    /// Read every view of a dataset at time 0, as of a scene at rest; images in subfolders of a COLMAP dataset are then
+    /// no frames of cameras.
+    #[arg(id = "static", long = "static")]
+    is_static: bool,
+    #[command(flatten)]
+    checkpoint: CheckpointArgs,
+}
+
+/// The contents of a file, without its Gaussians.
+struct Facts {
+    gaussians: usize,
+    form: &'static str,
+    model: Option<Model>,
+    color: ColorDegrees,
+    /// Number of entries of each color codebook; `None` if coefficients are not coded.
+    codebooks: Option<Vec<u32>>,
+    environment: Option<[u32; 2]>,
+    trained_with: TrainedWith,
+    playback: PlaybackHints,
+    levels: Vec<LevelFacts>,
+}
+
+/// A level of detail, without its Gaussians.
+#[derive(Serialize)]
+struct LevelFacts {
+    /// The largest size on the screen at which it is drawn, pixels.
+    pixels: f32,
+    /// Number of Gaussians; `None` if the package is damaged.
+    gaussians: Option<usize>,
+}
+
+/// Bounds of the Gaussians, capture units.
+struct Extent {
+    /// Bounds of all Gaussians over the whole time interval.
+    all: Bounds,
+    /// Bounds of the core ([`Bounds::core`]).
+    core: Bounds,
+}
+
+impl Info {
+    /// Reads the file and describes it.
+    ///
+    /// # Errors
+    /// The file cannot be read. If sections are damaged or a Gaussian cannot be drawn, the result is a report with a
+    /// failure.
+    pub(crate) fn run(&self) -> Result<Report, Failure> {
+        if self.file.is_dir() && (Dataset::format(&self.file).is_some() || codec::inspect(&self.file).is_err()) {
+            self.given.require(Need::Capture, false)?;
+            let options = CameraOptions { is_static: self.is_static, ..CameraOptions::default() };
+            return info_dataset::run(&self.file, &options, self.cameras.as_deref());
+        }
+        self.given.require(Need::Dataset, false)?;
+        let size = file_size(&self.file)?;
+        let (format, package) = codec::inspect(&self.file)?;
+        if let Some(info) = package.as_ref().filter(|info| !info.is_intact()) {
+            let (damaged, all) = (info.damaged.len(), info.header.sections.len());
+            let message = format!("{damaged} of {all} sections are damaged; copy or download the package again");
+            let failure = Failure::about(&self.file, &message);
+            return Ok(self.report(size, format, &Facts::of_package(info), package.as_ref(), None, Some(failure)));
+        }
+        let scene = self.checkpoint.load(&self.file)?;
+        let facts = Facts::of_scene(&scene);
+        let (extent, failure) = match scene.into_runtime() {
+            Ok(scene) => {
+                let TrainedWith { time_interval, marginal_cutoff, .. } = facts.trained_with;
+                let all = Bounds::of(scene.iter(), time_interval, marginal_cutoff, scene.filter.as_ref());
+                let core = Bounds::core(scene.iter());
+                (all.zip(core).map(|(all, core)| Extent { all, core }), None)
+            }
+            Err(error) => (None, Some(Failure::at(&self.file, &error))),
+        };
+        Ok(self.report(size, format, &facts, package.as_ref(), extent, failure))
+    }
+
+    fn report(
+        &self,
+        size: u64,
+        format: Format,
+        facts: &Facts,
+        package: Option<&PackageInfo>,
+        extent: Option<Extent>,
+        failure: Option<Failure>,
+    ) -> Report {
+        let version = package.map(|info| format!(", version {}", info.version)).unwrap_or_default();
+        let name = format!("{}{version}", format.id);
+        let mut pairs = vec![("file", self.file.display().to_string()), ("format", name), ("size", bytes(size))];
+        pairs.extend(facts.pairs());
+        if let Some(Extent { all, core }) = &extent {
+            pairs.extend([("bounds", corners(all)), ("middle", corners(core))]);
+        }
+        let mut text = lines(&pairs);
+        if let Some(info) = package {
+            text += &format!("\n{}", section_table(info));
+        }
+        let json = json!({
+            "file": self.file.display().to_string(),
+            "format": format.id,
+            "bytes": size,
+            "gaussians": facts.gaussians,
+            "form": facts.form,
+            "model": facts.model,
+            "coefficients": facts.color.coefficients,
+            "degree": facts.color.degree,
+            "degree_t": facts.color.degree_t,
+            "codebooks": facts.codebooks,
+            "environment": facts.environment,
+            "switches": switches_json(&facts.trained_with, &facts.playback),
+            "levels": facts.levels,
+            "bounds": extent.as_ref().map(|extent| box_json(&extent.all)),
+            "core": extent.as_ref().map(|extent| box_json(&extent.core)),
+            "package": package.map(package_json),
+            "error": failure.as_ref().map(Failure::message),
+        });
+        Report { failure, ..Report::new(json, text) }
+    }
+}
+
+impl Facts {
+    fn of_scene(scene: &GaussianScene) -> Self {
+        let coded = match &scene.form {
+            SceneForm::Trained(_) => None,
+            SceneForm::Ready(form) => form.coded_colors(),
+        };
+        Self {
+            gaussians: scene.len(),
+            form: form_name(&scene.form),
+            model: scene.model(),
+            color: scene.form.color_degrees(),
+            codebooks: coded.map(|colors| colors.entries.clone()),
+            environment: scene.environment.as_ref().map(|map| [map.width, map.height]),
+            trained_with: scene.trained_with.clone(),
+            playback: scene.playback,
+            levels: scene.levels.iter().map(LevelFacts::of_level).collect(),
+        }
+    }
+
+    fn of_package(info: &PackageInfo) -> Self {
+        let header = &info.header;
+        let (model, codebooks) = match header.form {
+            StoredForm::Trained { model } => (Some(model), None),
+            StoredForm::Sliced => (None, None),
+            StoredForm::Packed { codebooks } => (None, codebooks),
+        };
+        let used = |all: [u32; MAX_STAGES]| all.into_iter().filter(|&entries| entries > 0).collect::<Vec<_>>();
+        Self {
+            gaussians: header.gaussians,
+            form: header.form.name(),
+            model,
+            color: ColorDegrees { coefficients: header.coefficients, degree: header.degree, degree_t: header.degree_t },
+            codebooks: codebooks.map(used),
+            environment: header.environment.map(|map| [map.width, map.height]),
+            trained_with: header.trained_with.clone(),
+            playback: header.playback,
+            levels: header
+                .levels
+                .iter()
+                .map(|&StoredLevel { pixels }| LevelFacts { pixels, gaussians: None })
+                .collect(),
+        }
+    }
+
+    fn pairs(&self) -> Vec<(&'static str, String)> {
+        let model = match self.model {
+            Some(Model::Static3d) => "trained form, static 3D",
+            Some(Model::Unrotated4d) => "trained form, 4D without 4D rotation",
+            Some(Model::Rotated4d) => "trained form, native 4D",
+            None => self.form,
+        };
+        let ColorDegrees { coefficients, degree, degree_t } = self.color;
+        let stored = match &self.codebooks {
+            None => format!("{coefficients} coefficients stored"),
+            Some(entries) => format!("{coefficients} coefficients, coded by {} codebooks", entries.len()),
+        };
+        let environment = self.environment.map_or("none".to_owned(), |[width, height]| format!("{width} x {height}"));
+        let mut pairs = vec![
+            ("Gaussians", format!("{} ({model})", self.gaussians)),
+            ("color", format!("degree {degree}, time degree {degree_t}, {stored}")),
+            ("environment", environment),
+        ];
+        pairs.extend(switches(&self.trained_with, &self.playback));
+        if !self.levels.is_empty() {
+            let levels: Vec<String> = self.levels.iter().map(LevelFacts::to_string).collect();
+            pairs.push(("levels of detail", levels.join(", ")));
+        }
+        pairs
+    }
+}
+
+impl LevelFacts {
+    fn of_level(level: &Level) -> Self {
+        Self { pixels: level.pixels, gaussians: Some(level.scene.len()) }
+    }
+}
+
+impl fmt::Display for LevelFacts {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.gaussians {
+            Some(gaussians) => write!(f, "{gaussians} Gaussians up to {} pixels", self.pixels),
+            None => write!(f, "up to {} pixels", self.pixels),
+        }
+    }
+}
+
+/// All sections of one name.
+#[derive(Default)]
+struct Sections {
+    parts: usize,
+    bytes: u64,
+    unpacked: u64,
+    damaged: usize,
+}
+
+/// Returns a table with one row for all sections of the same name, in the order of the file.
+fn section_table(info: &PackageInfo) -> Table {
+    let mut rows: Vec<(&str, Sections)> = Vec::new();
+    let mut places = HashMap::new();
+    for (index, section) in info.header.sections.iter().enumerate() {
+        let place = *places.entry(section.name.as_str()).or_insert(rows.len());
+        if place == rows.len() {
+            rows.push((section.name.as_str(), Sections::default()));
+        }
+        let all = &mut rows[place].1;
+        all.parts += 1;
+        all.bytes += section.length as u64;
+        // Sections with unknown names may have any number.
+        all.unpacked = all.unpacked.saturating_add(section.raw_length as u64);
+        all.damaged += usize::from(info.damaged.binary_search(&index).is_ok());
+    }
+    let mut table = Table::new(&["section", "parts", "bytes", "unpacked", "checksums"]);
+    for (name, Sections { parts, bytes, unpacked, damaged }) in rows {
+        table.row([
+            printable(name),
+            parts.to_string(),
+            bytes.to_string(),
+            unpacked.to_string(),
+            if damaged == 0 { "hold".to_owned() } else { format!("{damaged} BROKEN") },
+        ]);
+    }
+    table
+}
+
+fn package_json(info: &PackageInfo) -> Value {
+    json!({
+        "version": info.version,
+        "generator": info.header.generator,
+        "intact": info.is_intact(),
+        "damaged": info.damaged,
+        "sections": info.header.sections,
+    })
+}
+
+/// Returns the corners of a box with three decimals, and with more of a box smaller than a tenth of a unit.
+fn corners(bounds: &Bounds) -> String {
+    let side = (bounds.max - bounds.min).max_element();
+    let smaller = if side > 0.0 { (-side.log10()).clamp(0.0, 9.0) as usize } else { 0 };
+    let decimals = 3 + smaller;
+    let corner = |Vec3 { x, y, z }: Vec3| format!("({x:.decimals$}, {y:.decimals$}, {z:.decimals$})");
+    format!("{} to {}", corner(bounds.min), corner(bounds.max))
+}
+
+fn box_json(bounds: &Bounds) -> Value {
+    json!({ "min": bounds.min.to_array(), "max": bounds.max.to_array() })
+}
