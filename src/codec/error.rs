@@ -8,7 +8,7 @@ use super::options::InvalidOption;
 use super::package::PackageError;
 use crate::gaussian::InvalidGaussian;
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Why a file was not read or written.
 #[derive(Debug, thiserror::Error)]
@@ -17,7 +17,14 @@ pub struct CodecError {
     /// The file.
     pub path: PathBuf,
     /// The reason.
-    pub kind: CodecErrorKind,
+    pub kind: Box<CodecErrorKind>,
+}
+
+impl CodecError {
+    /// Returns an error about the file `path`.
+    pub fn at(path: &Path, kind: impl Into<CodecErrorKind>) -> Self {
+        Self { path: path.to_owned(), kind: Box::new(kind.into()) }
+    }
 }
 
 /// The reasons of a [`CodecError`].

@@ -5,9 +5,8 @@
 
 use super::checkpoint;
 use super::error::CodecErrorKind;
-use super::fourdgs;
 use super::import::source::{Beside, Source};
-use super::import::{ImportError, Imported, gltf, ksplat, npz, ply, sequence, sog, splat, splatv, spz};
+use super::import::{ImportError, Imported, fourdgs, gltf, ksplat, npz, ply, sequence, sog, splat, splatv, spz};
 use super::input::Input;
 use super::looks;
 use super::options::ReadOptions;
@@ -41,7 +40,7 @@ pub struct Format {
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Read {
     /// From a file that is positioned at its start and has this path, and the other files of its folder.
-    File(fn(Input, &Path, &dyn Beside, &ReadOptions) -> Result<Imported, CodecErrorKind>),
+    File(fn(&mut Input, &Path, &dyn Beside, &ReadOptions) -> Result<Imported, CodecErrorKind>),
     /// From its bytes in memory.
     Bytes(fn(&Source<'_>, &ReadOptions) -> Result<Imported, ImportError>),
     /// From the files of the folder at a path.
@@ -175,10 +174,9 @@ impl Format {
     }
 }
 
-/// Returns the extensions of files of other makes, without the dot.
-pub fn imported_extensions() -> Vec<&'static str> {
-    let imported = FORMATS.iter().filter(|format| matches!(format.read, Read::Bytes(_)));
-    let mut extensions: Vec<&str> = imported.flat_map(|format| format.extensions).copied().collect();
+/// Returns the extensions of the files of all formats, without the dot.
+pub fn extensions() -> Vec<&'static str> {
+    let mut extensions: Vec<&str> = FORMATS.iter().flat_map(|format| format.extensions).copied().collect();
     extensions.sort_unstable();
     extensions.dedup();
     extensions
@@ -202,8 +200,8 @@ pub(super) fn unknown_folder() -> String {
     )
 }
 
-/// Returns whether a file is a checkpoint: a zip archive that has the pickle of a trainer, or that is damaged, so that its error is that of
-/// the most frequent archive; or a file of torch before version 1.6.
+/// Returns whether a file is a checkpoint: a zip archive that has the pickle of a trainer, or that is damaged, so that
+/// its error is that of the most frequent archive; or a file of torch before version 1.6.
 fn is_checkpoint(start: &Start) -> bool {
     let has_pickle = start.entries.iter().any(|entry| entry.ends_with("data.pkl"));
     let is_archive = start.bytes.starts_with(ZIP) && (start.entries.is_empty() || has_pickle);
@@ -215,7 +213,7 @@ fn is_package(start: &Start) -> bool {
 }
 
 fn read_checkpoint(
-    file: Input,
+    file: &mut Input,
     path: &Path,
     beside: &dyn Beside,
     options: &ReadOptions,
@@ -223,7 +221,7 @@ fn read_checkpoint(
     Ok(checkpoint::read_file(file, path, beside, options)?)
 }
 
-fn read_package(file: Input, _: &Path, _: &dyn Beside, options: &ReadOptions) -> Result<Imported, CodecErrorKind> {
+fn read_package(file: &mut Input, _: &Path, _: &dyn Beside, options: &ReadOptions) -> Result<Imported, CodecErrorKind> {
     Ok(Imported { scene: package::read_with(file, options)?, lost: Vec::new() })
 }
 

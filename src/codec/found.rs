@@ -1,7 +1,8 @@
 //! The capture of a file: the file itself, or one capture inside of it.
 //!
-//! In: a file, and the others of its folder. Out: [`Found`], which reads the scene. Gzip and zip archives that are no format of captures are looked
-//! into, once: what gzip has packed, and the only capture of an archive, whatever their names.
+//! In: a file, and the others of its folder. Out: [`Found`], which reads the scene. Gzip and zip archives that are no
+//! format of captures are looked into, once: what gzip has packed, and the only capture of an archive, whatever their
+//! names.
 
 use super::budget::Budget;
 use super::error::CodecErrorKind;
@@ -15,6 +16,7 @@ use super::options::ReadOptions;
 use super::start::{Start, ZIP};
 use super::text::printable;
 use flate2::read::MultiGzDecoder;
+use std::io::Seek;
 use std::path::{Path, PathBuf};
 
 /// Most names of files in an error.
@@ -82,27 +84,33 @@ impl<'p> Found<'p> {
         Ok(Self { format, input, name: path, others: Box::new(archive.beside(name)), is_inside: true })
     }
 
-    /// Reads the scene, with what it does not show.
+    /// Reads the scene, with what it does not show. After an error it can be read again, for instance with further
+    /// files of the folder.
     ///
     /// # Errors
     /// A damaged file; options that are invalid or contradict the file.
-    pub(super) fn read(self, options: &ReadOptions) -> Result<Imported, CodecErrorKind> {
-        let Self { format, input, name, others, is_inside } = self;
-        let read = || match format.read {
-            Read::File(read) => read(input, &name, &*others, options),
-            Read::Bytes(read) => {
-                let bytes = input.into_bytes()?;
-                Ok(read(&Source { bytes: &bytes, beside: &*others }, options)?)
-            }
-            Read::Folder(_) => Err(CodecErrorKind::UnknownFormat(format::unknown_folder())),
-        };
-        if !is_inside {
-            return read();
+    pub(super) fn read(&mut self, options: &ReadOptions) -> Result<Imported, CodecErrorKind> {
+        if !self.is_inside {
+            return self.read_input(options);
         }
-        let shown = printable(&name.to_string_lossy());
-        let mut imported = read().map_err(|error| ImportError::damaged(format!("its file {shown}: {error}")))?;
+        let shown = printable(&self.name.to_string_lossy());
+        let read = self.read_input(options);
+        let mut imported = read.map_err(|error| ImportError::damaged(format!("its file {shown}: {error}")))?;
         imported.lost.insert(0, format!("It is a zip archive, of which {shown} is shown."));
         Ok(imported)
+    }
+
+    /// Reads the scene from its bytes.
+    fn read_input(&mut self, options: &ReadOptions) -> Result<Imported, CodecErrorKind> {
+        self.input.rewind()?;
+        match self.format.read {
+            Read::File(read) => read(&mut self.input, &self.name, &*self.others, options),
+            Read::Bytes(read) => {
+                let bytes = self.input.all()?;
+                Ok(read(&Source { bytes: &bytes, beside: &*self.others }, options)?)
+            }
+            Read::Folder(_) => Err(CodecErrorKind::UnknownFormat(format::unknown_folder())),
+        }
     }
 }
 

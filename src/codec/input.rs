@@ -1,8 +1,9 @@
 //! The bytes of a capture that is read: a file on disk, or memory.
 //!
-//! In: a path, or bytes that were unpacked from another file. Out: [`Input`], which can be read at any place. Only regular files are opened: a named pipe
-//! or a device that a file names would be waited for without an end.
+//! In: a path, or bytes that were unpacked from another file. Out: [`Input`], which can be read at any place. Only
+//! regular files are opened: a named pipe or a device that a file names would be waited for without an end.
 
+use std::borrow::Cow;
 use std::fs::File;
 use std::io::{self, BufReader, Cursor, Read, Seek, SeekFrom};
 use std::path::Path;
@@ -33,14 +34,14 @@ impl Input {
     ///
     /// # Errors
     /// A file that cannot be read.
-    pub(crate) fn into_bytes(self) -> io::Result<Vec<u8>> {
+    pub(crate) fn all(&mut self) -> io::Result<Cow<'_, [u8]>> {
         match self {
-            Self::Memory(bytes) => Ok(bytes.into_inner()),
-            Self::File(mut file) => {
+            Self::Memory(bytes) => Ok(Cow::Borrowed(bytes.get_ref().as_slice())),
+            Self::File(file) => {
                 let mut bytes = Vec::new();
                 file.rewind()?;
                 file.read_to_end(&mut bytes)?;
-                Ok(bytes)
+                Ok(Cow::Owned(bytes))
             }
         }
     }
@@ -105,7 +106,7 @@ mod tests {
             input.seek(SeekFrom::End(-3)).expect("it has seven bytes");
             input.read_exact(&mut end).expect("three are left");
             assert_eq!(&end, b"ure", "the last bytes");
-            assert_eq!(input.into_bytes().expect("it can be read"), b"capture", "all bytes");
+            assert_eq!(*input.all().expect("it can be read"), *b"capture", "all bytes");
         }
         let refused = open_regular(folder.path()).expect_err("a folder").to_string();
         assert!(refused.contains("is a folder"), "{refused}");

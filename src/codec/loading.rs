@@ -1,19 +1,29 @@
-//! A file in memory that is read in steps, for programs that must go on meanwhile, as a page in a browser.
+//! A file in memory that is read in steps, so that a program with one thread, such as a page in a browser, can draw and
+//! answer between two steps.
 //!
-//! In: the name and the bytes of a file, and [`ReadOptions`]. Out: after some steps, a [`GaussianScene`]; after some more, a [`RuntimeScene`]. Packages are
-//! read in small steps, checkpoints and files of other makes in one; all are converted in small steps.
+//! In: the name and the bytes of a file, [`ReadOptions`], and other files of its folder when they are asked for. Out:
+//! after some steps, a [`RuntimeScene`]. Packages are read in small steps, checkpoints and files of other makes in one;
+//! all are converted for drawing in small steps.
 
 use super::error::{CodecError, CodecErrorKind};
 use super::found::Found;
-use super::import::source::InMemory;
+use super::import::source::{Beside, checked, named};
+use super::import::{Imported, sequence};
 use super::input::Input;
 use super::options::ReadOptions;
 use super::package::{self, PackageError, Reading};
+use super::read_frames;
 use crate::scene::{Conversion, GaussianScene, RuntimeScene};
+use std::collections::BTreeMap;
 use std::io::{self, Cursor};
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// A file that is being read.
+///
+/// A capture may consist of several files: the textures of a SOG, `cfg_args` of a checkpoint, the frames of a sequence
+/// ([`ReadOptions::sequence`]). [`wanted`](Self::wanted) names the next of them, and [`supply`](Self::supply) takes it.
+/// A program that supplies none reads captures of a single file.
 ///
 /// # Examples
 ///
@@ -22,7 +32,7 @@ use std::path::{Path, PathBuf};
 ///
 /// let bytes = std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/assets/toybox.gs4d"))?;
 /// let mut loading = Loading::new("toybox.gs4d", bytes, &ReadOptions::default())?;
-/// while loading.advance(1 << 20)? {
+/// while loading.advance(Loading::STEP)? {
 ///     // A page draws here, and shows the progress.
 ///     assert!((0.0..=1.0).contains(&loading.progress()), "a part of the file");
 /// }
@@ -33,105 +43,143 @@ use std::path::{Path, PathBuf};
 pub struct Loading {
     path: PathBuf,
     options: ReadOptions,
+    supplied: Supplied,
+    /// The name of the file that the next step needs.
+    wanted: Option<String>,
+    lost: Vec<String>,
     state: State,
 }
 
 enum State {
     Package(Box<Reading<Cursor<Vec<u8>>>>),
-    /// A file of another make, or inside of another file.
-    Other(Box<Found<'static>>),
-    /// Its scene.
-    Read(Box<GaussianScene>),
+    /// A file that is read in one step.
+    Whole(Box<Found<'static>>),
+    /// The names and the bytes of the frames of a sequence, which are read in one step.
+    Frames(Vec<(String, Vec<u8>)>),
     Converting(Box<Conversion>),
     /// A step has failed.
     Failed,
 }
 
 impl Loading {
-    /// Recognizes the format of a file by its contents, or by the extension of its name, and reads the header of a package.
+    /// Bytes of a step that is short on every machine: about two milliseconds on a slow one.
+    pub const STEP: usize = 1 << 16;
+
+    /// Recognizes the format of a file by its contents, or by the extension of its name, and reads the header of a
+    /// package.
     ///
     /// # Errors
     /// Bytes of an unknown format; a damaged header; options that are invalid.
-    pub fn new(name: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Self, CodecError> {
-        let path = PathBuf::from(name);
-        let state = State::of(&path, bytes, options).map_err(|kind| CodecError { path: path.clone(), kind })?;
-        Ok(Self { path, options: options.clone(), state })
-    }
-
-    /// Does one step. For a package it decompresses or stores about `bytes` at most. Returns whether there is more to do.
-    ///
-    /// # Errors
-    /// As [`load`](super::load).
-    pub fn advance(&mut self, bytes: usize) -> Result<bool, CodecError> {
-        let advanced = match &mut self.state {
-            State::Package(reading) => reading.advance(bytes).map_err(CodecErrorKind::from),
-            State::Other(_) => self.read_other().map(|()| true),
-            State::Read(_) | State::Converting(_) => Ok(false),
-            State::Failed => Err(failed()),
+    pub fn new(name: impl AsRef<Path>, bytes: Vec<u8>, options: &ReadOptions) -> Result<Self, CodecError> {
+        let (path, supplied) = (name.as_ref().to_owned(), Supplied::default());
+        let state = State::of(&path, bytes, options, &supplied);
+        let state = state.map_err(|kind| CodecError::at(&path, kind))?;
+        let wanted = match &state {
+            State::Frames(frames) => frames.last().and_then(|(name, _)| sequence::next(name)),
+            _ => None,
         };
-        advanced.map_err(|kind| CodecError { path: self.path.clone(), kind })
+        let lost = if state.is_native() { options.without_effect() } else { None };
+        Ok(Self { path, options: options.clone(), supplied, wanted, lost: lost.into_iter().collect(), state })
     }
 
-    /// Reads a file of another make.
-    fn read_other(&mut self) -> Result<(), CodecErrorKind> {
-        if let State::Other(found) = std::mem::replace(&mut self.state, State::Failed) {
-            self.state = State::Read(Box::new(found.read(&self.options)?.scene));
-        }
-        Ok(())
-    }
-
-    /// Does one step towards a scene that can be drawn: as [`advance`](Self::advance), then as [`GaussianScene::into_runtime`], about `bytes` at most.
-    /// Returns whether there is more to do.
+    /// Does one step towards a scene that can be drawn. A step of a package or of the conversion reads, decompresses,
+    /// stores or converts about `bytes` at most. Returns whether there is more to do.
+    ///
+    /// A file that is [wanted](Self::wanted) and was not supplied counts as missing.
     ///
     /// # Errors
-    /// As [`load`](super::load); a Gaussian that cannot be drawn.
-    pub fn advance_runtime(&mut self, bytes: usize) -> Result<bool, CodecError> {
-        if !matches!(self.state, State::Converting(_)) && self.advance(bytes)? {
-            return Ok(true);
+    /// As [`load`](super::load); a Gaussian that cannot be drawn. After an error, every further step is one.
+    pub fn advance(&mut self, bytes: usize) -> Result<bool, CodecError> {
+        self.step(bytes).map_err(|kind| CodecError::at(&self.path, kind))
+    }
+
+    fn step(&mut self, bytes: usize) -> Result<bool, CodecErrorKind> {
+        if self.wanted.is_some() {
+            self.supply(Err(io::Error::new(io::ErrorKind::NotFound, "there is no such file")));
         }
-        let mut advance = || match std::mem::replace(&mut self.state, State::Failed) {
+        self.state = match std::mem::replace(&mut self.state, State::Failed) {
+            State::Package(mut reading) => {
+                if reading.advance(bytes)? {
+                    State::Package(reading)
+                } else {
+                    State::converting(reading.finish_with(&self.options)?)?
+                }
+            }
+            State::Whole(found) => self.read_whole(found)?,
+            State::Frames(frames) => {
+                let Imported { scene, lost } = read_frames(frames, &self.options)?;
+                self.lost.extend(lost);
+                State::converting(scene)?
+            }
             State::Converting(mut conversion) => {
                 let is_more = conversion.advance(bytes)?;
                 self.state = State::Converting(conversion);
-                Ok(is_more)
+                return Ok(is_more);
             }
-            read => {
-                self.state = State::Converting(Box::new(Conversion::of(read.scene(&self.options)?)?));
-                Ok(true)
-            }
+            State::Failed => return Err(failed()),
         };
-        advance().map_err(|kind| CodecError { path: self.path.clone(), kind })
+        Ok(true)
+    }
+
+    /// Reads a file, unless its reader asks for another file that was not supplied yet: then the next step begins anew.
+    fn read_whole(&mut self, mut found: Box<Found<'static>>) -> Result<State, CodecErrorKind> {
+        let read = found.read(&self.options);
+        self.wanted = self.supplied.take_wanted();
+        if self.wanted.is_some() {
+            return Ok(State::Whole(found));
+        }
+        let Imported { scene, lost } = read?;
+        self.lost.extend(lost);
+        State::converting(scene)
+    }
+
+    /// Returns the name of a file that the next step needs, relative to the folder of the file.
+    pub fn wanted(&self) -> Option<&str> {
+        self.wanted.as_deref()
+    }
+
+    /// Supplies the bytes of the file that is [wanted](Self::wanted), or the reason why there are none. The reader
+    /// decides whether it can do without the file. No effect if no file is wanted.
+    pub fn supply(&mut self, file: io::Result<Vec<u8>>) {
+        let Some(name) = self.wanted.take() else { return };
+        match (&mut self.state, file) {
+            (State::Frames(frames), Ok(bytes)) => {
+                self.wanted = sequence::next(&name);
+                frames.push((name, bytes));
+            }
+            // The sequence ends with the frame before.
+            (State::Frames(_), Err(_)) => {}
+            (_, file) => self.supplied.supply(name, file),
+        }
     }
 
     /// Returns the part of the file that has been read, 0 to 1.
     pub fn progress(&self) -> f32 {
         match &self.state {
             State::Package(reading) => reading.progress(),
-            State::Other(_) => 0.0,
-            State::Read(_) | State::Converting(_) | State::Failed => 1.0,
+            State::Whole(_) | State::Frames(_) => 0.0,
+            State::Converting(_) | State::Failed => 1.0,
         }
     }
 
-    /// Does all remaining steps, and returns the scene; in the form that is drawn, if its conversion has begun.
-    ///
-    /// # Errors
-    /// As [`load`](super::load).
-    pub fn finish(mut self) -> Result<GaussianScene, CodecError> {
-        while self.advance(usize::MAX)? {}
-        self.state.scene(&self.options).map_err(|kind| CodecError { path: self.path, kind })
+    /// Returns what of the file the scene does not show, or shows approximately, and which options have no effect: one
+    /// sentence each. Complete once the file has been read.
+    pub fn lost(&self) -> &[String] {
+        &self.lost
     }
 
     /// Does all remaining steps, and returns the scene that can be drawn.
     ///
     /// # Errors
-    /// As [`advance_runtime`](Self::advance_runtime).
-    pub fn finish_runtime(mut self) -> Result<RuntimeScene, CodecError> {
-        while self.advance_runtime(usize::MAX)? {}
-        let scene = match self.state {
+    /// As [`advance`](Self::advance).
+    pub fn finish(mut self) -> Result<RuntimeScene, CodecError> {
+        while self.advance(usize::MAX)? {}
+        let Self { path, state, .. } = self;
+        let scene = match state {
             State::Converting(conversion) => conversion.finish().map_err(CodecErrorKind::from),
             _ => Err(failed()),
         };
-        scene.map_err(|kind| CodecError { path: self.path, kind })
+        scene.map_err(|kind| CodecError::at(&path, kind))
     }
 }
 
@@ -140,22 +188,79 @@ fn failed() -> CodecErrorKind {
 }
 
 impl State {
-    fn of(path: &Path, bytes: Vec<u8>, options: &ReadOptions) -> Result<Self, CodecErrorKind> {
+    fn of(path: &Path, bytes: Vec<u8>, options: &ReadOptions, supplied: &Supplied) -> Result<Self, CodecErrorKind> {
+        if options.sequence {
+            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            return Ok(Self::Frames(vec![(name, bytes)]));
+        }
         if bytes.starts_with(&package::MAGIC) {
             options.check().map_err(PackageError::from)?;
             return Ok(Self::Package(Box::new(Reading::new(Cursor::new(bytes))?)));
         }
-        Ok(Self::Other(Box::new(Found::of(Input::of(bytes), path, Box::new(InMemory::default()))?)))
+        Ok(Self::Whole(Box::new(Found::of(Input::of(bytes), path, Box::new(supplied.clone()))?)))
     }
 
-    /// Returns the scene, once it has been read.
-    fn scene(self, options: &ReadOptions) -> Result<GaussianScene, CodecErrorKind> {
+    /// Begins to convert a scene.
+    fn converting(scene: GaussianScene) -> Result<Self, CodecErrorKind> {
+        Ok(Self::Converting(Box::new(Conversion::of(scene)?)))
+    }
+
+    /// Returns whether the file is a package or a checkpoint.
+    fn is_native(&self) -> bool {
         match self {
-            Self::Package(reading) => Ok(reading.finish_with(options)?),
-            Self::Read(scene) => Ok(*scene),
-            Self::Converting(conversion) => Ok(conversion.finish()?.into()),
-            Self::Other(_) | Self::Failed => Err(failed()),
+            Self::Package(_) => true,
+            Self::Whole(found) => ["checkpoint", "package"].contains(&found.format.id),
+            Self::Frames(_) | Self::Converting(_) | Self::Failed => false,
         }
+    }
+}
+
+/// Other files of the folder, by the names by which a reader has asked for them.
+#[derive(Clone, Default)]
+struct Supplied(Arc<Mutex<SuppliedFiles>>);
+
+#[derive(Default)]
+struct SuppliedFiles {
+    /// The bytes of each file, or why there are none.
+    known: BTreeMap<String, Result<Vec<u8>, (io::ErrorKind, String)>>,
+    /// The first file that a reader has asked for and that is not known.
+    wanted: Option<String>,
+}
+
+impl Supplied {
+    fn files(&self) -> MutexGuard<'_, SuppliedFiles> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn supply(&self, name: String, file: io::Result<Vec<u8>>) {
+        let file = file.map_err(|error| (error.kind(), error.to_string()));
+        self.files().known.insert(name, file);
+    }
+
+    fn take_wanted(&self) -> Option<String> {
+        self.files().wanted.take()
+    }
+}
+
+impl Beside for Supplied {
+    /// As its trait says; a file that is not known is an error of the kind `WouldBlock`.
+    fn read(&self, name: &str) -> io::Result<Vec<u8>> {
+        let name = checked(name)?;
+        let mut files = self.files();
+        let error = match files.known.get(name) {
+            Some(Ok(bytes)) => return Ok(bytes.clone()),
+            Some(Err((kind, reason))) => io::Error::new(*kind, reason.clone()),
+            None => {
+                files.wanted.get_or_insert_with(|| name.to_owned());
+                io::Error::new(io::ErrorKind::WouldBlock, "it has not been supplied yet")
+            }
+        };
+        Err(named(name, error))
+    }
+
+    /// Returns whether the file was supplied: a file is not asked for only to know whether there is one.
+    fn has(&self, name: &str) -> bool {
+        checked(name).is_ok_and(|name| matches!(self.files().known.get(name), Some(Ok(_))))
     }
 }
 
@@ -163,11 +268,11 @@ impl State {
 mod tests {
     use super::*;
     use crate::scene::synth::{SynthSettings, synthesize};
-    use crate::scene::{SceneForm, Trained};
+    use crate::scene::{SceneForm, Trained, UpAxis};
 
     const BUNDLED: &[u8] = include_bytes!("../../assets/toybox.gs4d");
 
-    fn loading(bytes: &[u8]) -> Result<GaussianScene, CodecError> {
+    fn loading(bytes: &[u8]) -> Result<RuntimeScene, CodecError> {
         let mut loading = Loading::new("toybox.gs4d", bytes.to_vec(), &ReadOptions::default())?;
         let mut before = 0.0;
         while loading.advance(10_007)? {
@@ -178,34 +283,98 @@ mod tests {
         loading.finish()
     }
 
-    #[test]
-    fn a_package_that_is_read_in_steps_is_the_package() {
-        let at_once = package::read(Cursor::new(BUNDLED)).expect("the bundled capture is intact");
-        assert!(loading(BUNDLED).expect("it is read in steps") == at_once, "every value is the same");
+    fn package_of(scene: &GaussianScene) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        package::write(&mut bytes, scene, &package::WriteSettings::default()).expect("it can be written");
+        bytes
     }
 
     #[test]
-    fn a_scene_that_is_converted_in_steps_is_the_scene() {
+    fn a_package_that_is_read_in_steps_is_the_package() {
         let synth = |degree| synthesize(&SynthSettings { count: 3000, degree, ..SynthSettings::default() });
-        let packages = [synth(0), synth(3)].map(|scene| {
-            let mut bytes = Vec::new();
-            package::write(&mut bytes, &scene, &package::WriteSettings::default()).expect("it can be written");
-            bytes
-        });
+        let packages = [package_of(&synth(0)), package_of(&synth(3))];
         // Trained Gaussians, and packed ones with levels of detail.
         for bytes in packages.iter().map(Vec::as_slice).chain([BUNDLED]) {
             let loading = || Loading::new("it.gs4d", bytes.to_vec(), &ReadOptions::default()).expect("a package");
             let at_once = package::read(Cursor::new(bytes)).expect("it is intact").into_runtime().expect("drawable");
             for size in [1_000, 1 << 16, usize::MAX] {
                 let (mut stepped, mut steps) = (loading(), 0);
-                while stepped.advance_runtime(size).expect("it is intact") {
+                while stepped.advance(size).expect("it is intact") {
                     steps += 1;
                 }
                 assert!(steps > 10 || size > 1 << 16, "{steps} steps of {size} bytes");
-                assert!(stepped.finish_runtime().expect("it is intact") == at_once, "every value is the same");
+                assert!(stepped.finish().expect("it is intact") == at_once, "every value is the same");
             }
-            assert!(loading().finish_runtime().expect("it is intact") == at_once, "without a step, too");
+            assert!(loading().finish().expect("it is intact") == at_once, "without a step, too");
         }
+        assert_eq!(loading(BUNDLED).expect("it is intact").len(), 45_000, "with a progress that grows to 1");
+    }
+
+    #[test]
+    fn options_replace_the_settings_of_a_package_and_those_without_an_effect_are_named() {
+        let options = ReadOptions {
+            up: Some(UpAxis::NegY),
+            duration_seconds: Some(7.0),
+            fps: Some(24.0),
+            ..ReadOptions::default()
+        };
+        let mut loading = Loading::new("toybox.gs4d", BUNDLED.to_vec(), &options).expect("a package");
+        while loading.advance(usize::MAX).expect("it is intact") {}
+        assert!(loading.lost().iter().any(|sentence| sentence.contains("fps")), "{:?}", loading.lost());
+        let playback = loading.finish().expect("it is intact").playback;
+        assert_eq!((playback.up, playback.duration_seconds), (UpAxis::NegY, 7.0), "the options");
+        let contradicting = ReadOptions { time_interval: Some([0.0, 99.0]), ..ReadOptions::default() };
+        let loading = Loading::new("toybox.gs4d", BUNDLED.to_vec(), &contradicting).expect("a package");
+        let refused = loading.finish().expect_err("the Gaussians are of another interval").to_string();
+        assert!(refused.contains("time_interval"), "the option is named: {refused}");
+    }
+
+    /// A glTF file whose buffer is another file, and which shows no Gaussians.
+    const NAMES_ANOTHER: &str = r#"{"asset": {"version": "2.0"}, "buffers": [{"uri": "a%20b.bin", "byteLength": 4}],
+        "meshes": [{"primitives": [{"extensions": {"KHR_gaussian_splatting": {}}}]}]}"#;
+
+    #[test]
+    fn other_files_are_asked_for_until_the_reader_has_them() {
+        let begun = || {
+            let bytes = NAMES_ANOTHER.as_bytes().to_vec();
+            let mut loading = Loading::new("x/a.gltf", bytes, &ReadOptions::default()).expect("a glTF file");
+            assert_eq!(loading.wanted(), None, "not before the first step");
+            assert!(loading.advance(1).expect("a step that asks"), "there is more to do");
+            assert_eq!(loading.wanted(), Some("a b.bin"), "the name in the folder of the file");
+            loading
+        };
+        let message = |mut loading: Loading| loop {
+            match loading.advance(1) {
+                Ok(is_more) => assert!(is_more, "a file without Gaussians is refused"),
+                Err(error) => break error.to_string(),
+            }
+        };
+        let missing = message(begun());
+        assert!(missing.contains("a b.bin") && missing.contains("no such file"), "not supplied: {missing}");
+        let mut refused = begun();
+        refused.supply(Err(io::Error::other("the server is down")));
+        let refused = message(refused);
+        assert!(refused.contains("a b.bin") && refused.contains("the server is down"), "the reason: {refused}");
+        let mut supplied = begun();
+        supplied.supply(Ok(vec![0; 4]));
+        assert_eq!(supplied.wanted(), None, "it is supplied");
+        let supplied = message(supplied);
+        assert!(!supplied.contains("a b.bin"), "the file is there, and has no Gaussians: {supplied}");
+    }
+
+    #[test]
+    fn frames_are_asked_for_until_one_is_missing() {
+        let options = ReadOptions { sequence: true, fps: Some(2.0), ..ReadOptions::default() };
+        let frame = || b"ply\nformat ascii 1.0\nend_header\n".to_vec();
+        let mut loading = Loading::new("clip/f_9.ply", frame(), &options).expect("it is not looked at yet");
+        for expected in ["f_10.ply", "f_11.ply"] {
+            assert_eq!(loading.wanted(), Some(expected), "the next frame");
+            loading.supply(Ok(frame()));
+        }
+        loading.supply(Err(io::Error::other("it is not there")));
+        assert_eq!(loading.wanted(), None, "the sequence ends");
+        let message = loading.advance(1).expect_err("frames without Gaussians").to_string();
+        assert!(message.contains("f_9.ply"), "the first frame is refused by its name: {message}");
     }
 
     #[test]
@@ -213,17 +382,15 @@ mod tests {
         let mut scene = synthesize(&SynthSettings { count: 3000, ..SynthSettings::default() });
         let SceneForm::Trained(Trained { parameters, .. }) = &mut scene.form else { panic!("a trained scene") };
         parameters.rotation_l[2100] = [0.0; 4];
-        let mut bytes = Vec::new();
-        package::write(&mut bytes, &scene, &package::WriteSettings::default()).expect("it can be written");
-        let mut loading = Loading::new("it.gs4d", bytes, &ReadOptions::default()).expect("a package");
+        let mut loading = Loading::new("it.gs4d", package_of(&scene), &ReadOptions::default()).expect("a package");
         let refused = loop {
-            match loading.advance_runtime(1 << 14) {
+            match loading.advance(1 << 14) {
                 Ok(is_more) => assert!(is_more, "it is refused"),
                 Err(error) => break error.to_string(),
             }
         };
         assert!(refused.starts_with("it.gs4d: Gaussian 2100: "), "{refused}");
-        assert!(loading.advance_runtime(1).is_err() && loading.finish().is_err(), "it stays refused");
+        assert!(loading.advance(1).is_err() && loading.finish().is_err(), "it stays refused");
     }
 
     #[test]

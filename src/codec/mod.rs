@@ -1,9 +1,10 @@
 //! Files and scenes.
 //!
 //! In: a path, and [`ReadOptions`] for settings that the file may not contain. Out: a [`GaussianScene`]; and back.
-//! `format` is the table of formats: [`checkpoint`] reads the files of the 4DGS trainer (`.pth`), of gsplat and of nerfstudio,
-//! [`package`] reads and writes the format of this crate (`.gs4d`), `import` reads those of other makes. `found` finds the capture of a
-//! file, which may be inside of gzip or of a zip archive; `looks` says what a file is that is no capture.
+//! `format` is the table of formats: [`checkpoint`] reads the files of the 4DGS trainer (`.pth`), of gsplat and of
+//! nerfstudio, [`package`] reads and writes the format of this crate (`.gs4d`), `import` reads those of other makes.
+//! `found` finds the capture of a file, which may be inside of gzip or of a zip archive; `looks` says what a file is
+//! that is no capture.
 
 pub(crate) mod budget;
 pub mod checkpoint;
@@ -11,7 +12,6 @@ mod error;
 pub(crate) mod export;
 pub(crate) mod format;
 mod found;
-mod fourdgs;
 pub(crate) mod hidden;
 pub(crate) mod import;
 mod in_archive;
@@ -37,12 +37,12 @@ pub use format::Format;
 use format::Read;
 use found::Found;
 use import::Imported;
-use import::source::{Beside, InFolder, InMemory, Source};
+use import::source::{InFolder, InMemory};
 use import::{sequence, sog};
 use input::Input;
 use package::{PackageInfo, WriteSettings};
 use start::Start;
-use std::io::{Cursor, Write};
+use std::io::Write;
 use std::path::Path;
 
 /// A path that has been looked at.
@@ -53,9 +53,9 @@ enum Opened<'p> {
     File(Found<'p>),
 }
 
-/// Reads a capture: a file, the folder of a sequence of files, or that of a SOG. Its format follows from the contents of the file, not from its
-/// name, unless nothing in the file tells it. A file in gzip is unpacked, and of a zip archive its only capture is read. The format interprets the
-/// options; see [`ReadOptions`].
+/// Reads a capture: a file, the folder of a sequence of files, or that of a SOG. Its format follows from the contents
+/// of the file, not from its name, unless nothing in the file tells it. A file in gzip is unpacked, and of a zip
+/// archive its only capture is read. The format interprets the options; see [`ReadOptions`].
 ///
 /// # Errors
 /// A file that cannot be opened, is of an unknown format, or is damaged; options that are invalid or contradict the
@@ -70,31 +70,24 @@ pub fn load(path: &Path, options: &ReadOptions) -> Result<GaussianScene, CodecEr
 /// As [`load`].
 pub(crate) fn load_stating(path: &Path, options: &ReadOptions) -> Result<Imported, CodecError> {
     let read = || match open(path)? {
-        Opened::File(found) => found.read(options),
+        Opened::File(mut found) => found.read(options),
         Opened::Folder(Format { read: Read::Folder(read), .. }) => Ok(read(path, options)?),
         Opened::Folder(_) => Err(CodecErrorKind::UnknownFormat(format::unknown_folder())),
     };
-    read().map_err(|kind| CodecError { path: path.to_owned(), kind })
+    read().map_err(|kind| CodecError::at(path, kind))
 }
 
-/// Reads a capture of another make from bytes in memory.
+/// Reads a capture from bytes in memory, with the other files of its folder.
 ///
 /// # Errors
 /// Bytes of an unknown format; as [`load`].
 pub(crate) fn read_bytes(
     path: &Path,
-    bytes: &[u8],
-    beside: &dyn Beside,
+    bytes: Vec<u8>,
+    others: InMemory,
     options: &ReadOptions,
 ) -> Result<Imported, CodecErrorKind> {
-    let start = Start::of(&mut Cursor::new(bytes), path)?;
-    match Format::of(&start).map(|format| format.read) {
-        Some(Read::Bytes(read)) => Ok(read(&Source { bytes, beside }, options)?),
-        Some(Read::File(read)) => read(Input::of(bytes.to_vec()), path, beside, options),
-        Some(Read::Folder(_)) | None => {
-            Found::of(Input::of(bytes.to_vec()), path, Box::new(InMemory::default()))?.read(options)
-        }
-    }
+    Found::of(Input::of(bytes), path, Box::new(others))?.read(options)
 }
 
 /// Reads the frames of a sequence, each the name and the bytes of a file, in order.
@@ -118,7 +111,7 @@ pub fn inspect(path: &Path) -> Result<(Format, Option<PackageInfo>), CodecError>
             Ok((format, format.inspect.map(|inspect| inspect(input)).transpose()?))
         }
     };
-    inspect().map_err(|kind| CodecError { path: path.to_owned(), kind })
+    inspect().map_err(|kind: CodecErrorKind| CodecError::at(path, kind))
 }
 
 /// Returns the file at a path, or the format of the folder there.

@@ -16,7 +16,8 @@ pub(crate) const FPS: f32 = 30.0;
 /// A checkpoint contains none of these settings: a field that is `None` is taken from `cfg_args` in the folder of the
 /// checkpoint, else from the default. A package contains all of them: a field that is given replaces the stored value;
 /// for a field that the Gaussians of the package depend on (`time_interval`, `rotation_convention`, `force_sh_3d`,
-/// `prefilter_var`), a value other than the stored one is an error.
+/// `prefilter_var`), a value other than the stored one is an error. `fps` and `tolerance` have no effect on packages
+/// and checkpoints; [`Loading::lost`](super::Loading::lost) and the log of a game say so.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ReadOptions {
@@ -27,8 +28,8 @@ pub struct ReadOptions {
     /// Convention of the rotations in the file. Default: flipped, unless the file is certainly unflipped (all
     /// coefficients of the time blocks zero at time degree 2).
     pub rotation_convention: Option<RotationConvention>,
-    /// Field of view that shaped the footprints. Default: reference, the placeholder of the original trainer, for its checkpoints; corrected, the
-    /// true one, for files of other makes.
+    /// Field of view that shaped the footprints. Default: reference, the placeholder of the original trainer, for its
+    /// checkpoints; corrected, the true one, for files of other makes.
     pub raster_fov: Option<RasterFov>,
     /// Kind of cameras that took the training views. Default: intrinsics if there is an environment map, else field of
     /// view.
@@ -39,19 +40,23 @@ pub struct ReadOptions {
     pub force_sh_3d: Option<bool>,
     /// Added to the temporal variance in the marginal, if positive. Default: the value in `cfg_args`, else −1.
     pub prefilter_var: Option<f32>,
-    /// The axis that points up. Default: +Z for checkpoints; for files of other makes that of the file or its format, −Y for PLY without a comment about it.
+    /// The axis that points up. Default: +Z for checkpoints; for files of other makes that of the file or its format,
+    /// −Y for PLY without a comment about it.
     pub up: Option<UpAxis>,
-    /// Seconds of one pass through the time interval; 0 for a still. Default: the length of the interval, as if its unit
-    /// were the second.
+    /// Seconds of one pass through the time interval; 0 for a still. Default: the length of the interval, as if its
+    /// unit were the second.
     pub duration_seconds: Option<f32>,
-    /// The marginal at and below which a Gaussian is not drawn, from 1/255 to below 1. Default: what the format has; 0.05 for checkpoints.
+    /// The marginal at and below which a Gaussian is not drawn, from 1/255 to below 1. Default: what the format has;
+    /// 0.05 for checkpoints.
     pub marginal_cutoff: Option<f32>,
-    /// Frames a second of a sequence of files, whose numbers count frames, and of the frames of motion in a PLY. Default: 30.
+    /// Frames a second of a sequence of files, whose numbers count frames, and of the frames of motion in a PLY.
+    /// Default: 30.
     pub fps: Option<f32>,
-    /// Whether the file is the first of several with consecutive numbers in their names, which are the frames of a sequence. Default: `false`.
+    /// Whether the file is the first of several with consecutive numbers in their names, which are the frames of a
+    /// sequence. Default: `false`.
     pub sequence: bool,
-    /// Largest distance between a curved path and the straight pieces that replace it, relative to the middle scale of the Gaussian.
-    /// Default: 0.25.
+    /// Largest distance between a curved path and the straight pieces that replace it, relative to the middle scale of
+    /// the Gaussian. Default: 0.25.
     pub tolerance: Option<f32>,
 }
 
@@ -66,6 +71,15 @@ pub struct InvalidOption {
 }
 
 impl ReadOptions {
+    /// Returns a sentence about the options that are given and have no effect on packages and checkpoints; `None` if
+    /// there are none.
+    pub(crate) fn without_effect(&self) -> Option<String> {
+        let given = [("fps", self.fps.is_some()), ("tolerance", self.tolerance.is_some())];
+        let names: Vec<&str> = given.into_iter().filter_map(|(name, is_given)| is_given.then_some(name)).collect();
+        (!names.is_empty())
+            .then(|| format!("Options without an effect on packages and checkpoints: {}.", names.join(", ")))
+    }
+
     /// Checks the values given.
     ///
     /// # Errors

@@ -1,8 +1,7 @@
-//! The file of a checkpoint: a zip archive, or of torch before 1.6 pickles and values one after another.
+//! The file of a checkpoint: a zip archive, or in torch before 1.6 pickles followed by the values of the storages.
 //!
 //! In: a seekable reader, and the [`Tensor`]s to read. Out: the small entries as bytes, and the values of one tensor at
-//! a time, read in one pass to their destination and in an archive checked against the checksum of the entry. Nothing
-//! else is read.
+//! a time, read in one pass and in an archive checked against the checksum of the entry. Nothing else is read.
 
 use super::error::CheckpointError;
 use super::legacy::{Legacy, PICKLE_LIMIT};
@@ -38,7 +37,6 @@ pub(super) struct Slot<'p> {
     pub name: &'static str,
     /// Name of a row in messages: Gaussian or channel.
     pub row: &'static str,
-    /// The tensor.
     pub tensor: &'p Tensor<'p>,
 }
 
@@ -55,7 +53,6 @@ pub(super) struct Located<'p> {
 
 /// The destination of the rows of a tensor: `width` values from `start` in each stretch of `pitch` values.
 pub(super) struct Rows<'v> {
-    /// All stretches.
     pub values: &'v mut [f32],
     /// Length of a stretch.
     pub pitch: usize,
@@ -124,8 +121,7 @@ impl<R: Read + Seek> Archive<R> {
         }
     }
 
-    /// Returns the bytes of an entry; `None` if there is none of that name. An entry of more than `limit` bytes is an
-    /// error.
+    /// Returns the bytes of an entry; `None` if it does not exist. An entry of more than `limit` bytes is an error.
     fn small(&mut self, name: &'static str, limit: u64) -> Result<Option<Vec<u8>>, CheckpointError> {
         let Some((index, size)) = self.find(name)? else { return Ok(None) };
         if size > limit {

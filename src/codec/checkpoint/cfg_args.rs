@@ -1,18 +1,27 @@
 //! `cfg_args`, the text file that the trainer writes next to its checkpoints.
 //!
-//! In: the files beside a checkpoint, and the text `Namespace(sh_degree=3, ..., white_background=False, prefilter_var=-1.0)`
-//! of the file in the same folder. Out: the entries that drawing depends on.
+//! In: the files beside a checkpoint, and the text `Namespace(sh_degree=3, ..., white_background=False,
+//! prefilter_var=-1.0)` of the file in the same folder. Out: the entries that drawing depends on.
 
 use crate::codec::import::source::Beside;
+use std::io;
 
 /// Largest number of bytes that is used of the file, which has about 300.
 const LIMIT: usize = 1 << 16;
 
 /// Returns the text of the file among those beside a checkpoint; `None` if it cannot be read, since it is optional.
-pub(super) fn read(beside: &dyn Beside) -> Option<String> {
-    let mut text = beside.read("cfg_args").ok()?;
-    text.truncate(LIMIT);
-    Some(String::from_utf8_lossy(&text).into_owned())
+///
+/// # Errors
+/// A file that has yet to be fetched: reading begins anew when it is there.
+pub(super) fn read(beside: &dyn Beside) -> io::Result<Option<String>> {
+    match beside.read("cfg_args") {
+        Ok(mut text) => {
+            text.truncate(LIMIT);
+            Ok(Some(String::from_utf8_lossy(&text).into_owned()))
+        }
+        Err(error) if error.kind() == io::ErrorKind::WouldBlock => Err(error),
+        Err(_) => Ok(None),
+    }
 }
 
 /// The entries of `cfg_args` that are used; `None` if absent or invalid.

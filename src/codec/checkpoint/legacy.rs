@@ -1,6 +1,7 @@
 //! Files of torch before 1.6: pickles, then the values of each storage, without an archive.
 //!
-//! In: a seekable reader. Out: the bytes of the pickle of the objects, and those of one storage at a time. Nothing checks whether values are damaged.
+//! In: a seekable reader. Out: the bytes of the pickle of the objects, and those of one storage at a time. Nothing
+//! checks whether values are damaged.
 
 use super::error::CheckpointError;
 use super::pickle::{Pickle, Value};
@@ -28,7 +29,7 @@ struct Stored {
 }
 
 impl<R: Read + Seek> Legacy<R> {
-    /// Returns whether a reader begins so, and returns to its first byte.
+    /// Returns whether the bytes of a reader begin with [`START`], and rewinds it.
     ///
     /// # Errors
     /// Errors of the reader.

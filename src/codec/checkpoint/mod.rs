@@ -1,4 +1,4 @@
-//! Checkpoints (`.pth`) of the original 4DGS trainer, and those of gsplat (`.pt`) and nerfstudio (`.ckpt`), read without Python.
+//! Checkpoints of the original 4DGS trainer (`.pth`), gsplat (`.pt`) and nerfstudio (`.ckpt`), read without Python.
 //!
 //! In: a seekable file, [`ReadOptions`], and the text of `cfg_args`. Out: a [`GaussianScene`] in the trained form.
 //!
@@ -47,8 +47,7 @@ pub(super) fn is_legacy(start: &[u8]) -> bool {
 
 /// Reads a checkpoint. `cfg_args` is the text of the file of that name in the same folder; `None` if there is none.
 ///
-/// Rotations of the unflipped convention are converted; [`TrainedWith`](crate::scene::TrainedWith) records the
-/// convention of the file.
+/// Unflipped rotations are converted; [`TrainedWith`](crate::scene::TrainedWith) records the convention of the file.
 ///
 /// # Errors
 /// Invalid options; a damaged or foreign file; values that are not finite, quaternions of length zero.
@@ -64,7 +63,7 @@ pub fn read<R: Read + Seek>(
 ///
 /// # Errors
 /// As [`read`].
-pub(crate) fn read_stating<R: Read + Seek>(
+fn read_stating<R: Read + Seek>(
     reader: R,
     options: &ReadOptions,
     cfg_args: Option<&str>,
@@ -79,8 +78,8 @@ pub(crate) fn read_stating<R: Read + Seek>(
     }
 }
 
-/// Parses the pickle of a checkpoint. Only if its outermost value is a dictionary, as other trainers write it, may it have objects that the 4DGS
-/// trainer does not write.
+/// Parses the pickle of a checkpoint. Objects that the 4DGS trainer does not write are accepted only if the outermost
+/// value is a dictionary, as other trainers write it.
 fn parse(bytes: &[u8]) -> Result<Pickle<'_>, CheckpointError> {
     Pickle::parse(bytes).or_else(|refused| match Pickle::parse_inert(bytes) {
         Ok(pickle) if matches!(pickle.root(), Value::Dict(_)) => Ok(pickle),
@@ -126,7 +125,8 @@ pub(super) fn read_file(
     beside: &dyn Beside,
     options: &ReadOptions,
 ) -> Result<Imported, CheckpointError> {
-    let mut imported = read_stating(file, options, cfg_args::read(beside).as_deref())?;
+    let cfg_args = cfg_args::read(beside).map_err(CheckpointError::Io)?;
+    let mut imported = read_stating(file, options, cfg_args.as_deref())?;
     let part = path.file_name().and_then(|name| splats::other_part(&name.to_string_lossy()));
     if let Some(part) = part.filter(|part| beside.has(part)) {
         imported.lost.push(format!(

@@ -5,7 +5,7 @@
 
 use super::cfg_args::CfgArgs;
 use crate::codec::options::ReadOptions;
-use crate::scene::{Origin, PlaybackHints, RotationConvention, TrainedCameras, TrainedWith, UpAxis};
+use crate::scene::{Origin, PlaybackHints, RotationConvention, TrainedCameras, TrainedWith};
 use crate::view::NEAR;
 
 /// Values from the file itself.
@@ -63,7 +63,7 @@ pub fn describe(trained_with: &TrainedWith, playback: &PlaybackHints) -> Vec<(&'
         ("iteration", trained_with.iteration.to_string()),
         ("spatial lr scale", trained_with.spatial_lr_scale.to_string()),
         ("training pixel", trained_with.pixel.map_or("not known".to_owned(), |pixel| format!("{pixel} units"))),
-        ("up", axis(playback.up).to_owned()),
+        ("up", playback.up.name().to_owned()),
         ("duration", format!("{} s", playback.duration_seconds)),
     ];
     if trained_with.near != NEAR {
@@ -81,16 +81,4 @@ pub fn describe(trained_with: &TrainedWith, playback: &PlaybackHints) -> Vec<(&'
 
 fn lowercase(value: impl std::fmt::Debug) -> String {
     format!("{value:?}").to_lowercase()
-}
-
-/// Returns the name of an axis: `+z`.
-pub(crate) fn axis(up: UpAxis) -> &'static str {
-    match up {
-        UpAxis::PosX => "+x",
-        UpAxis::NegX => "-x",
-        UpAxis::PosY => "+y",
-        UpAxis::NegY => "-y",
-        UpAxis::PosZ => "+z",
-        UpAxis::NegZ => "-z",
-    }
 }

@@ -4,10 +4,9 @@
 //! contain the location of their values only.
 //!
 //! Only the opcodes and objects that `torch.save` writes for checkpoints of the trainer are accepted; everything else
-//! is refused by name, and nothing is ever executed. The files of other trainers have more in them: there, other objects
-//! are kept as their names alone ([`Value::Inert`]), and calls of them, too. Every step adds at most one value, values
-//! refer to each other by index (so nothing recurses), and no value is copied: time and memory are bounded by the length
-//! of the input.
+//! is refused by name, and nothing is ever executed. In the files of other trainers, further objects and the results of
+//! calls are kept as names ([`Value::Inert`]). Every step adds at most one value, values refer to each other by index
+//! (so nothing recurses), and no value is copied: time and memory are bounded by the length of the input.
 
 use super::error::CheckpointError;
 use super::tensor::{Storage, Tensor};
@@ -704,8 +703,8 @@ mod tests {
     }
 
     #[test]
-    fn in_files_of_other_programs_foreign_objects_are_names_that_are_never_called() {
-        // {"a": os.system("ls"), "b": collections.OrderedDict, "c": 2 ** 65, "d": -2}, with a call, a state and a big int.
+    fn foreign_objects_in_files_of_other_programs_are_kept_as_names_and_never_called() {
+        // {"a": os.system("ls"), "b": collections.OrderedDict, "c": 2 ** 65, "d": -2}: a call, a state, a big int.
         let bytes = b"\x80\x02}(X\x01\0\0\0acos\nsystem\n(X\x02\0\0\0lstR}bX\x01\0\0\0bcmy\nClass\n)\x81\
             X\x01\0\0\0c\x8a\x09\0\0\0\0\0\0\0\0\x02X\x01\0\0\0d\x8a\x01\xfeu.";
         assert!(Pickle::parse(bytes).is_err(), "no checkpoint of the trainer has these");
@@ -714,7 +713,11 @@ mod tests {
             Some(Value::Inert(name)) => name.to_string(),
             other => panic!("{key} is inert: {other:?}"),
         };
-        assert_eq!([named("a"), named("b")], ["os system", "my Class"], "what is not called has its name");
+        assert_eq!(
+            [named("a"), named("b")],
+            ["os system", "my Class"],
+            "an object and the result of a call are kept as names"
+        );
         assert_eq!(named("c"), "builtins int", "an int that is too large");
         assert!(matches!(pickle.entry(pickle.root(), "d"), Some(Value::Int(-2))), "a small int");
         assert_eq!(pickle.length(), bytes.len(), "all bytes");

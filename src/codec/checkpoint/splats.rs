@@ -1,12 +1,12 @@
 //! Gaussians of other trainers: gsplat's `simple_trainer`, and splatfacto of nerfstudio.
 //!
-//! In: a [`Pickle`] whose outermost value is a dictionary. Out: [`Imported`]: Gaussians at rest in the space of their training, and what the scene does
-//! not show.
+//! In: a [`Pickle`] whose outermost value is a dictionary. Out: [`Imported`]: Gaussians at rest in the space of their
+//! training, and what the scene does not show.
 
 use super::archive::{Archive, Rows, Slot};
 use super::error::CheckpointError;
 use super::pickle::{Pickle, Value};
-use crate::codec::import::columns::{Columns, Played, coefficient};
+use crate::codec::import::columns::{Columns, Played, coefficient, sigmoid};
 use crate::codec::import::drawable::keep_drawable;
 use crate::codec::import::{ImportError, Imported};
 use crate::codec::options::ReadOptions;
@@ -20,7 +20,7 @@ const PLACES: [&str; 2] = ["splats", "pipeline"];
 const MEANS: &str = "means";
 const FIRST: [&str; 2] = ["sh0", "features_dc"];
 const REST: [&str; 2] = ["shN", "features_rest"];
-/// The colors of gsplat with a network of appearance, which adds to them.
+/// The base colors of gsplat, to which its network of appearance adds a correction.
 const BASE: &str = "colors";
 /// Most keys of means that are looked at; real files have one.
 const PREFIXES: usize = 8;
@@ -31,7 +31,7 @@ const CORRECTIONS: [&str; 4] = ["app_module", "post_processing", "bil_grids", "a
 pub(super) struct Splats<'p> {
     pickle: &'p Pickle<'p>,
     dictionary: &'p Value<'p>,
-    /// What is before the name of each tensor in its key.
+    /// Prefix of the keys of the tensors.
     prefix: &'p str,
 }
 
@@ -89,7 +89,10 @@ impl<'p> Splats<'p> {
         lost: &mut Vec<String>,
     ) -> Result<Harmonics, CheckpointError> {
         if let Some(base) = self.tensor(&[BASE])? {
-            lost.push("Its colors are those before the network of appearance of gsplat, which is not read.".to_owned());
+            lost.push(
+                "Its colors are shown without the correction by gsplat's network of appearance, which is not read."
+                    .to_owned(),
+            );
             return Ok(plain(rows::<3, R>(archive, base, count)?.into_iter().map(|logits| logits.map(sigmoid))));
         }
         let (first, rest) = (self.needed(&FIRST)?, self.tensor(&REST)?);
@@ -136,7 +139,8 @@ impl<'p> Splats<'p> {
         let is_correction = |key: &str| CORRECTIONS.iter().any(|part| key.contains(part));
         if keys.map(|(key, _)| key).any(is_correction) {
             lost.push(
-                "What its training corrected in single pictures (appearance, exposure) is not applied.".to_owned(),
+                "The corrections of single pictures that its training learned (appearance, exposure) are not applied."
+                    .to_owned(),
             );
         }
     }
@@ -179,7 +183,8 @@ impl<'p> Splats<'p> {
     }
 }
 
-/// Returns the name of the file of another process of the same training, which has other Gaussians, if the name of a file is that of one of them.
+/// Returns the name of a file that another process of the same training wrote, with other Gaussians; `None` if `name`
+/// is not that of one process.
 pub(super) fn other_part(name: &str) -> Option<String> {
     let (before, after) = name.rsplit_once("_rank")?;
     let digits = after.find(|c: char| !c.is_ascii_digit()).unwrap_or(after.len());
@@ -191,10 +196,6 @@ pub(super) fn other_part(name: &str) -> Option<String> {
 fn plain(colors: impl Iterator<Item = [f32; 3]>) -> Harmonics {
     let values = colors.flat_map(|color| color.map(coefficient)).collect();
     Harmonics { coefficients: 1, degree: 0, degree_t: 0, values }
-}
-
-fn sigmoid(logit: f32) -> f32 {
-    1.0 / (1.0 + (-logit).exp())
 }
 
 /// Returns the shape of a tensor of `count` rows of `width` values, with an axis of length 1 if the tensor has one.

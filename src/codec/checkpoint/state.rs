@@ -102,8 +102,8 @@ impl<'p> Slots<'p> {
         }
     }
 
-    /// Returns the tensor of slot 17, of shape 3 × R × R; `None` if the slot is empty, or holds an empty tensor because
-    /// the map was never set.
+    /// Returns the tensor of slot 17, of shape 3 × R × R; `None` if the slot, or the tensor of a map never set, is
+    /// empty.
     fn environment(&self) -> Result<Option<Slot<'p>>, CheckpointError> {
         if matches!(self.value(17), Value::None) {
             return Ok(None);
@@ -177,11 +177,10 @@ impl<'p> State<'p> {
         Ok(parameters)
     }
 
-    /// Reads the color coefficients: the first coefficient from one tensor, the others from another, interleaved per
-    /// Gaussian.
+    /// Reads the color coefficients: the first from one tensor, the others from another, interleaved per Gaussian.
     ///
     /// # Errors
-    /// Tensors of other shapes or that cannot be read, too few coefficients for the active degrees, a value that is not finite.
+    /// Tensors of other shapes or that cannot be read; too few coefficients for the degrees; numbers not finite.
     pub(super) fn harmonics<R: Read + Seek>(
         &self,
         archive: &mut Archive<R>,
@@ -208,7 +207,7 @@ impl<'p> State<'p> {
         }
         let dc = archive.locate(self.features_dc, &[self.count, 1, 3])?;
         let others = archive.locate(self.features_rest, &[self.count, rest, 3])?;
-        // Both tensors are in the file, so their values together are no more than twice as many as the file has room for.
+        // Both tensors are in the file, so their values together are at most twice as many as fit in the file.
         let pitch = harmonics.coefficients * 3;
         harmonics.values = vec![0.0; self.count * pitch];
         archive.fill(&dc, Rows { values: &mut harmonics.values, pitch, start: 0, width: 3 })?;

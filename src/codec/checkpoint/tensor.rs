@@ -1,7 +1,7 @@
 //! Lazy tensors: the location of the values of a tensor in its storage.
 //!
-//! In: the arguments of torch's rebuild function. Out: a [`Tensor`], checked to lie inside its storage before anything
-//! is allocated for it.
+//! In: the arguments of torch's rebuild function. Out: a [`Tensor`], checked to be inside its storage before any
+//! allocation.
 
 /// A storage: an entry of the archive that has not been read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -13,7 +13,7 @@ pub(crate) struct Clip {
     pub duration_seconds: f32,
     /// Frames a second, for formats that count in frames.
     pub fps: f32,
-    /// The axis of the capture that points up. Writers of formats with an axis of their own rotate the Gaussians, with their colors.
+    /// The axis of the capture that points up. Formats with a fixed axis have the Gaussians and colors rotated.
     pub up: UpAxis,
     /// The marginal at and below which a Gaussian is not drawn.
     pub marginal_cutoff: f32,

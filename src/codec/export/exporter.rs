@@ -1,7 +1,7 @@
 //! The export of one scene to one format.
 //!
-//! In: a scene and a format. Out: [`Exporter`], which writes a file for each time, or one with all motion; and what of the scene its files do
-//! not show.
+//! In: a scene and a format. Out: [`Exporter`], which writes a file for each time, or one with all motion; and what of
+//! the scene its files do not show.
 
 use super::clip::Clip;
 use super::error::ExportError;
@@ -64,7 +64,8 @@ impl Exporter {
         &self.lost
     }
 
-    /// Writes the file of a time, which is in the unit of the scene; the file of all times if the format has motion. Returns its number of Gaussians.
+    /// Writes the file of a time, which is in the unit of the scene; the file of all times if the format has motion.
+    /// Returns its number of Gaussians.
     ///
     /// # Errors
     /// Errors of the writer; a Gaussian that cannot be drawn.
@@ -93,8 +94,8 @@ fn within(mut columns: Columns, format: &Export) -> Columns {
     columns
 }
 
-/// Returns a sentence about the Gaussians that are left out since they are too far for the format; of a capture that moves about most of those at its
-/// beginning, in its middle and at its end.
+/// Returns a sentence with the number of Gaussians beyond the farthest coordinate of the format, which are left out;
+/// for a moving capture the largest of the numbers at its beginning, middle and end.
 fn left_out(scene: &GaussianScene, format: &Export) -> Result<Option<String>, ExportError> {
     if format.farthest.is_none() {
         return Ok(None);
@@ -113,8 +114,8 @@ fn left_out(scene: &GaussianScene, format: &Export) -> Result<Option<String>, Ex
     let up_to = if moves { "Up to " } else { "" };
     Ok(most.map(|(number, all, limit)| {
         format!(
-            "{up_to}{number} of {all} Gaussians are left out: along an axis they are farther than {limit} units, up to which {} has enough \
-             digits for the others.",
+            "{up_to}{number} of {all} Gaussians are left out: they are more than {limit} units from the origin along an axis, beyond which {} \
+             has too few digits for the others.",
             format.name
         )
     }))

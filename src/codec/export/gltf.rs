@@ -1,11 +1,12 @@
 //! Binary glTF files (.glb) with `KHR_gaussian_splatting`.
 //!
-//! In: [`Columns`] at rest. Out: one primitive of points, +Y up, with linear scales as in the ratified extension, and with colors for viewers that do not
-//! know the extension.
+//! In: [`Columns`] at rest. Out: one primitive of points, +Y up, with linear scales as in the ratified extension, and
+//! with colors for viewers without the extension.
 
 use super::clip::Clip;
 use super::y_up::y_up;
-use crate::codec::import::columns::{Columns, SH_C0};
+use crate::codec::import::columns::{Columns, SH_C0, sigmoid};
+use crate::view::srgb;
 use glam::{Vec3, Vec4};
 use serde_json::{Value, json};
 use std::io::{self, BufWriter, Write};
@@ -33,7 +34,7 @@ pub(super) fn write(columns: &Columns, clip: &Clip, writer: &mut dyn Write) -> i
     let columns = &*y_up(columns, clip.up)?;
     let count = columns.len();
     if count == 0 {
-        return Err(invalid("a glTF file has at least one Gaussian"));
+        return Err(invalid("no Gaussian is drawn at this time, and a glTF file has at least one"));
     }
     let attributes = attributes(columns);
     let gaussian: usize = attributes.iter().map(|attribute| attribute.width).sum();
@@ -66,7 +67,7 @@ pub(super) fn write(columns: &Columns, clip: &Clip, writer: &mut dyn Write) -> i
 /// Returns the attributes, each of which takes a multiple of 4 bytes.
 fn attributes(columns: &Columns) -> Vec<Attribute<'_>> {
     let own = |name: &str| format!("KHR_gaussian_splatting:{name}");
-    let opacity = |index: usize| 1.0 / (1.0 + (-columns.opacity_logit[index]).exp());
+    let opacity = |index: usize| sigmoid(columns.opacity_logit[index]);
     let mut attributes = vec![
         floats("POSITION".to_owned(), "VEC3", 12, |index, row| put(row, &columns.mean[index])),
         floats(own("ROTATION"), "VEC4", 16, |index, row| {
@@ -82,7 +83,8 @@ fn attributes(columns: &Columns) -> Vec<Attribute<'_>> {
             width: 4,
             write: Box::new(move |index, row| {
                 let color = Vec3::from_slice(columns.harmonics.of(index)) * SH_C0 + 0.5;
-                let color = color.clamp(Vec3::ZERO, Vec3::ONE).map(linear).extend(opacity(index));
+                // Vertex colors are linear light.
+                let color = srgb::decode(color.clamp(Vec3::ZERO, Vec3::ONE)).extend(opacity(index));
                 row.extend(color.to_array().map(|channel| (channel * 255.0).round().clamp(0.0, 255.0) as u8));
             }),
         },
@@ -146,11 +148,6 @@ fn document(columns: &Columns, attributes: &[Attribute<'_>], length: u32) -> Val
 /// Appends numbers.
 fn put(row: &mut Vec<u8>, values: &[f32]) {
     row.extend(values.iter().flat_map(|value| value.to_le_bytes()));
-}
-
-/// Returns the linear light of an sRGB channel: colors of vertices are linear.
-fn linear(channel: f32) -> f32 {
-    if channel <= 0.040_45 { channel / 12.92 } else { ((channel + 0.055) / 1.055).powf(2.4) }
 }
 
 #[cfg(test)]

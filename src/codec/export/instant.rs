@@ -1,7 +1,7 @@
 //! A scene at one time.
 //!
-//! In: a scene and a time. Out: [`Columns`] of the Gaussians that are drawn at that time, at rest: where they are, with the opacity and the color that
-//! they have then. Exact, except for rounding; parameters of static scenes are not changed by a bit.
+//! In: a scene and a time. Out: [`Columns`] of the Gaussians that are drawn then, at rest, with their positions,
+//! opacities and colors of that time. Exact, except for rounding; parameters of static scenes are copied bit for bit.
 
 use super::still::Ready;
 use crate::codec::import::columns::Columns;
@@ -10,8 +10,8 @@ use crate::gaussian::harmonics::time_cosine;
 use crate::scene::{GaussianScene, TrainedWith};
 use rayon::prelude::*;
 
-/// Returns the Gaussians that are drawn at a time, which is in the unit of the scene. A packed scene is unpacked for each call: callers of many
-/// times unpack it before.
+/// Returns the Gaussians that are drawn at a time, which is in the unit of the scene. A packed scene is unpacked in
+/// each call: callers with many times unpack it first.
 ///
 /// # Errors
 /// The first Gaussian that cannot be drawn.

@@ -1,9 +1,8 @@
 //! What a file of another make does not hold, whatever the format.
 //!
-//! In: a scene and a format. Out: a sentence about each of its parts that other players do not know.
+//! In: a scene and a format. Out: a sentence about each of its parts that other players do not support.
 
 use super::table::Export;
-use crate::codec::checkpoint::options::axis;
 use crate::gaussian::{Model, ShDirection};
 use crate::scene::{GaussianScene, Origin, UpAxis};
 
@@ -18,7 +17,7 @@ pub(crate) fn of(scene: &GaussianScene, format: &Export) -> Vec<String> {
     }
     if scene.trained_with.uses_fov_sentinel() {
         lost.push(
-            "The footprints of this capture were shaped by a wider field of view, which other players do not know: theirs differ \
+            "The footprints of this capture were shaped by a wider field of view, which other players do not have: their footprints differ \
              slightly."
                 .to_owned(),
         );
@@ -27,13 +26,13 @@ pub(crate) fn of(scene: &GaussianScene, format: &Export) -> Vec<String> {
     if moves && scene.trained_with.sh_direction == ShDirection::Canonical && degree > 0 {
         lost.push(
             "View-dependent color of a moving Gaussian is that of the direction to its undisplaced mean; other players use the \
-             direction to where it is."
+             direction to its position."
                 .to_owned(),
         );
     }
     if scene.trained_with.mip_filter && !format.has_mip_filter {
         lost.push(
-            "The capture was trained with the filter of Mip-Splatting, which the files do not say: other programs draw its fine detail \
+            "The capture was trained with the filter of Mip-Splatting, which the files cannot state: other programs draw its fine detail \
              slightly thicker."
                 .to_owned(),
         );
@@ -42,20 +41,20 @@ pub(crate) fn of(scene: &GaussianScene, format: &Export) -> Vec<String> {
     lost
 }
 
-/// Returns a sentence about the axis that points up, and one about the origin, if other players do not know them.
+/// Returns a sentence about the axis that points up, and one about the origin, if the files do not state them.
 fn of_space(scene: &GaussianScene, format: &Export) -> Vec<String> {
     let (up, Origin { place, time }) = (scene.playback.up, scene.trained_with.origin);
     let mut lost = Vec::new();
     if format.has_space && up != UpAxis::NegY {
-        let up = axis(up);
+        let up = up.name();
         lost.push(format!(
-            "{up} points up, which a comment of the file says: other programs than gs4d take -y for it."
+            "{up} points up, which a comment of the file states: programs other than gs4d take -y as up."
         ));
     }
     if !format.has_space && place != [0.0; 3] {
         let [x, y, z] = place;
         lost.push(format!(
-            "The origin of the capture, ({x}, {y}, {z}) in the coordinates of its files, is left out: places are relative to it."
+            "The origin of the capture, ({x}, {y}, {z}) in the coordinates of its files, is left out: positions are relative to it."
         ));
     }
     if format.is_moving() && time != 0.0 {

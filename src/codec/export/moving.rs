@@ -1,9 +1,9 @@
 //! A scene with its motion.
 //!
-//! In: a scene. Out: [`Columns`] of all its Gaussians with [`Motion`], their color without harmonics in time, and what that loses.
+//! In: a scene. Out: [`Columns`] of all its Gaussians with [`Motion`], color without harmonics in time, and the losses.
 //!
-//! Harmonics in time are replaced by their mean over the times at which the Gaussian is visible, which is nearer to its color, weighted by
-//! opacity, than the color at its temporal mean, and than the color without them.
+//! Harmonics in time are replaced by their mean over the times at which the Gaussian is visible, which is nearer to its
+//! color, weighted by opacity, than the color at its temporal mean, and than the color without them.
 
 use super::error::ExportError;
 use super::still::Ready;
@@ -16,7 +16,7 @@ use std::f64::consts::TAU;
 /// Returns all Gaussians. The temporal filter stays if `keeps_filter`.
 ///
 /// # Errors
-/// The first Gaussian that cannot be drawn; without a filter, a scene whose Gaussians only the filter switches on and off.
+/// The first Gaussian that cannot be drawn; without a filter, a scene whose Gaussians only a filter activates.
 pub(crate) fn moving(scene: &GaussianScene, keeps_filter: bool) -> Result<(Columns, Vec<String>), ExportError> {
     let ready = Ready::of(scene)?;
     let mut lost = Vec::new();
@@ -26,7 +26,7 @@ pub(crate) fn moving(scene: &GaussianScene, keeps_filter: bool) -> Result<(Colum
         Some(filter) if filter.kind != FilterKind::Support => {
             if filter.kind == FilterKind::Window {
                 return Err(ExportError::Unsupported(
-                    "its Gaussians are switched on and off at certain times, which this format cannot say; export a sequence (--sequence), or as .4dgs"
+                    "its Gaussians are switched on and off at certain times, which this format cannot state; export a sequence (--sequence), or as .4dgs"
                         .to_owned(),
                 ));
             }
@@ -65,7 +65,7 @@ pub(crate) fn moving(scene: &GaussianScene, keeps_filter: bool) -> Result<(Colum
     Ok((Columns { harmonics, ..columns }, lost))
 }
 
-/// Returns the mean of `cos(frequency t)` over a range of times; at one time if the range is empty.
+/// Returns the mean of `cos(frequency t)` over a range of times, which may be a single time.
 fn mean_cosine(frequency: f64, [from, to]: [f64; 2]) -> f32 {
     let half = frequency * (to - from) / 2.0;
     let around = if half.abs() < 1e-6 { 1.0 } else { half.sin() / half };

@@ -1,19 +1,19 @@
 //! PLY files of Gaussians: those of 3DGS, and those of `FreeTimeGS` with motion.
 //!
-//! In: [`Columns`]. Out: binary little-endian floats, with the properties of the original trainer in its order. Places are those of the capture: a comment
-//! says which axis points up, unless it is -y as in files of trainers; and if the capture has an origin, they are those of its files, in double precision.
+//! In: [`Columns`]. Out: binary little-endian floats, with the properties of the original trainer in its order.
+//! Positions are those of the capture: a comment states the axis that points up, unless it is -y as in files of
+//! trainers. If the capture has an origin, positions are those of its files, in double precision.
 
 use super::clip::Clip;
-use crate::codec::checkpoint::options::axis;
 use crate::codec::import::columns::{Columns, Motion};
 use crate::codec::import::ply::axes::UP;
 use crate::codec::import::ply::origin::ORIGIN;
 use crate::scene::UpAxis;
 use std::io::{self, Write};
 
-/// The name, and the default, of the shortest lifespan: lifespans are exported as they are.
+/// The comment with the shortest lifespan, which is 0: lifespans are exported unchanged.
 const SHORTEST: &str = "min_duration 0";
-/// The temporal deviation of a Gaussian that is present at every time, in clips: its marginal is 1 in single precision.
+/// Temporal deviation of a Gaussian that is always present, in clip lengths: its marginal is 1 in single precision.
 const ALWAYS: f32 = 1e4;
 
 /// Writes Gaussians at rest as 3DGS trainers do.
@@ -25,7 +25,7 @@ pub(super) fn write_instant(columns: &Columns, clip: &Clip, writer: &mut dyn Wri
     let mut record = Vec::new();
     for index in 0..columns.len() {
         record.clear();
-        write_place(columns, index, writer)?;
+        write_position(columns, index, writer)?;
         push_still(columns, index, &mut record);
         writer.write_all(bytes(&mut record))?;
     }
@@ -55,7 +55,7 @@ pub(super) fn write_moving(columns: &Columns, clip: &Clip, writer: &mut dyn Writ
     let mut record = Vec::new();
     for (index, &Motion { velocity, mean_t, sigma_t }) in columns.motion.iter().enumerate() {
         record.clear();
-        write_place(columns, index, writer)?;
+        write_position(columns, index, writer)?;
         push_still(columns, index, &mut record);
         record.push((mean_t - first) / span);
         record.push((sigma_t / span).min(ALWAYS).ln());
@@ -97,7 +97,7 @@ fn write_header(
 /// Returns the comments about the space of a file.
 fn space(columns: &Columns, clip: &Clip) -> Vec<String> {
     let [x, y, z] = columns.origin;
-    let up = (clip.up != UpAxis::NegY).then(|| format!("{UP} {}", axis(clip.up)));
+    let up = (clip.up != UpAxis::NegY).then(|| format!("{UP} {}", clip.up.name()));
     let origin = has_origin(columns).then(|| format!("{ORIGIN} {x} {y} {z}"));
     up.into_iter().chain(origin).collect()
 }
@@ -106,8 +106,8 @@ fn has_origin(columns: &Columns) -> bool {
     columns.origin != [0.0; 3]
 }
 
-/// Writes the place of a Gaussian in the coordinates of the capture's files.
-fn write_place(columns: &Columns, index: usize, writer: &mut dyn Write) -> io::Result<()> {
+/// Writes the position of a Gaussian in the coordinates of the capture's files.
+fn write_position(columns: &Columns, index: usize, writer: &mut dyn Write) -> io::Result<()> {
     for (mean, origin) in columns.mean[index].into_iter().zip(columns.origin) {
         if has_origin(columns) {
             writer.write_all(&(origin + f64::from(mean)).to_le_bytes())?;
@@ -118,7 +118,7 @@ fn write_place(columns: &Columns, index: usize, writer: &mut dyn Write) -> io::R
     Ok(())
 }
 
-/// Appends the other values that Gaussians at rest have. Coefficients above degree 0 are in the order of the trainer: all of red first.
+/// Appends the other values of a Gaussian at rest. Coefficients above degree 0 are in channel order: all of red first.
 fn push_still(columns: &Columns, index: usize, record: &mut Vec<f32>) {
     let colors = columns.harmonics.of(index);
     let (first, rest) = colors.split_at(3);

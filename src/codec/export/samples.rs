@@ -1,9 +1,9 @@
 //! Gaussians for the tests of exports.
 //!
-//! In: a number and a degree. Out: [`Columns`] whose values all differ; a comparison of columns up to the precision of a format.
+//! In: a number and a degree. Out: [`Columns`] whose values all differ; their comparison within a tolerance.
 
 use super::clip::Clip;
-use crate::codec::import::columns::Columns;
+use crate::codec::import::columns::{Columns, sigmoid};
 use crate::gaussian::{Harmonics, SMALLEST_CUTOFF};
 use crate::scene::UpAxis;
 use glam::Vec4;
@@ -58,7 +58,6 @@ pub(super) fn assert_alike(found: &Columns, expected: &Columns, tolerance: &Tole
         let is_near = found.len() == expected.len() && differ <= tolerance;
         assert!(is_near, "{what} of Gaussian {index}: {found:?}, not {expected:?}, differ by {differ}");
     };
-    let opacity = |logit: f32| [1.0 / (1.0 + (-logit).exp())];
     for index in 0..expected.len() {
         near("mean", index, &found.mean[index], &expected.mean[index], tolerance.mean);
         near("log scale", index, &found.log_scale[index], &expected.log_scale[index], tolerance.log_scale);
@@ -66,7 +65,7 @@ pub(super) fn assert_alike(found: &Columns, expected: &Columns, tolerance: &Tole
             (Vec4::from(found.rotation[index]).normalize(), Vec4::from(expected.rotation[index]).normalize());
         let own = if own.dot(other) < 0.0 { -own } else { own };
         near("rotation", index, &own.to_array(), &other.to_array(), tolerance.rotation);
-        let (own, other) = (opacity(found.opacity_logit[index]), opacity(expected.opacity_logit[index]));
+        let [own, other] = [found, expected].map(|columns| [sigmoid(columns.opacity_logit[index])]);
         near("opacity", index, &own, &other, tolerance.opacity);
         let (own, other) = (found.harmonics.of(index), expected.harmonics.of(index));
         near("color", index, &own[..3], &other[..3], tolerance.color);

@@ -4,7 +4,7 @@
 
 use super::clip::Clip;
 use super::y_up::y_down;
-use crate::codec::import::columns::{Columns, SH_C0};
+use crate::codec::import::columns::{Columns, SH_C0, sigmoid};
 use glam::Vec4;
 use std::io::{self, Write};
 
@@ -24,7 +24,7 @@ pub(super) fn write(columns: &Columns, clip: &Clip, writer: &mut dyn Write) -> i
         for channel in 0..3 {
             record[24 + channel] = byte(0.5 + SH_C0 * colors[channel]);
         }
-        record[27] = byte(1.0 / (1.0 + (-columns.opacity_logit[index]).exp()));
+        record[27] = byte(sigmoid(columns.opacity_logit[index]));
         let rotation = Vec4::from(columns.rotation[index]).normalize_or(Vec4::X);
         for (byte, component) in record[28..].iter_mut().zip(rotation.to_array()) {
             *byte = (component * 128.0 + 128.0).round().clamp(0.0, 255.0) as u8;

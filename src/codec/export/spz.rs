@@ -1,7 +1,7 @@
-//! SPZ files of version 3, which readers of versions 2, 3 and 4 have in common: one stream of gzip.
+//! SPZ files of version 3, which readers of versions 2, 3 and 4 all read: one stream of gzip.
 //!
-//! In: [`Columns`] at rest. Out: 20 bytes for each Gaussian and one for each further value of its color, before gzip; +Y up. Gaussians beyond
-//! [`farthest`] are left out before.
+//! In: [`Columns`] at rest. Out: 20 bytes for each Gaussian and one for each further value of its color, before gzip;
+//! +Y up. Gaussians beyond [`farthest`] are left out before.
 
 use super::clip::Clip;
 use super::y_up::y_up;
@@ -11,22 +11,22 @@ use flate2::write::GzEncoder;
 use glam::Vec4;
 use std::io::{self, BufWriter, Write};
 
-/// The largest position before its binary digits are moved behind the point.
+/// The largest position in steps, which has 24 bits with the sign.
 const LARGEST: f32 = 8_388_607.0;
 
-/// Most binary digits behind the point: the usual number is 12, from a time of larger Gaussians.
+/// Most fractional bits of a position. Other writers use 12, chosen for larger Gaussians.
 const FRACTIONAL_BITS: u8 = 16;
 
-/// Steps of a position in the size of a usual Gaussian that are fine enough.
+/// Sufficient number of position steps in the size of the median Gaussian.
 const STEPS: f32 = 4.0;
-/// One of so many Gaussians, or fewer, may be left out so that the others have such steps.
+/// At most one of this many Gaussians may be left out so that the others have such steps.
 const FEW: usize = 100;
 
 /// The flag of files trained with the screen-space filter of Mip-Splatting.
 const ANTIALIASED: u8 = 1;
 
-/// Returns the farthest coordinate that a file of these Gaussians holds, capture units: that of 24 bits with steps that are fine enough for the
-/// usual Gaussian. If more than a few are beyond, steps may be as large as 1 unit.
+/// Returns the farthest coordinate that a file of these Gaussians holds, capture units: the largest of 24 bits with
+/// steps fine enough for the median Gaussian, or with steps of 1 unit if more than a few Gaussians are beyond.
 pub(super) fn farthest(columns: &Columns) -> f32 {
     let size = |scales: &[f32; 3]| scales.iter().copied().fold(f32::NEG_INFINITY, f32::max);
     let mut sizes: Vec<f32> = columns.log_scale.iter().map(size).collect();
@@ -34,8 +34,8 @@ pub(super) fn farthest(columns: &Columns) -> f32 {
     if sizes.is_empty() {
         return LARGEST;
     }
-    let usual = sizes.select_nth_unstable_by(middle, f32::total_cmp).1.exp();
-    let bits = (STEPS / usual).log2().ceil().clamp(0.0, f32::from(FRACTIONAL_BITS));
+    let median = sizes.select_nth_unstable_by(middle, f32::total_cmp).1.exp();
+    let bits = (STEPS / median).log2().ceil().clamp(0.0, f32::from(FRACTIONAL_BITS));
     let limit = LARGEST / bits.exp2();
     let beyond = columns.mean.iter().filter(|mean| !mean.iter().all(|value| value.abs() <= limit)).count();
     if beyond * FEW <= columns.len() { limit } else { LARGEST }
@@ -153,25 +153,25 @@ mod tests {
     }
 
     #[test]
-    fn far_positions_take_digits_from_behind_the_point() {
+    fn far_positions_reduce_the_fractional_bits() {
         let mut columns = samples::columns(2, 0);
         columns.mean[0][1] = -5000.0;
         let (found, _) = spz::columns(&written(&columns, UpAxis::PosY)).expect("a file");
         assert_eq!(found.mean[0][1], -5000.0, "a position beyond 128 units");
         columns.mean[0][1] = 1e9;
         let refused = write(&columns, &samples::clip(UpAxis::PosY), &mut Vec::new());
-        assert!(refused.is_err(), "a position that 24 bits cannot have");
+        assert!(refused.is_err(), "a position beyond 24 bits");
     }
 
     #[test]
-    fn few_far_positions_do_not_take_the_digits_of_the_others() {
+    fn few_far_positions_do_not_reduce_the_fractional_bits() {
         let with_far = |count: usize, far: usize| {
             let mut columns = samples::columns(count, 0);
             columns.log_scale = vec![[-6.0, -4.0, -5.0]; count];
             columns.mean.iter_mut().take(far).for_each(|mean| mean[2] = -1e6);
             farthest(&columns)
         };
-        // e^-4 is 0.018: 4 steps need 8 digits behind the point.
+        // e^-4 is 0.018: 4 steps need 8 fractional bits.
         assert_eq!(with_far(300, 0), 8_388_607.0 / 256.0, "fine steps");
         assert_eq!(with_far(300, 3), 8_388_607.0 / 256.0, "3 of 300 are left out");
         assert_eq!(with_far(300, 4), 8_388_607.0, "more are kept, with coarser steps");

@@ -1,6 +1,7 @@
-//! One Gaussian at rest, as files of other makes have it: scales and a rotation in place of a covariance, color without time.
+//! One Gaussian at rest for files of other makes: scales and a rotation instead of a covariance, color without time.
 //!
-//! In: a scene in any form. Out: [`Ready`], its sliced Gaussians; the axes of a covariance; coefficients with the harmonics in time evaluated.
+//! In: a scene in any form. Out: [`Ready`], its sliced Gaussians; the axes of a covariance; coefficients with the
+//! harmonics in time evaluated.
 
 use crate::codec::import::columns::logit;
 use crate::gaussian::eigen::eigen;
@@ -16,7 +17,7 @@ const BLOCK: usize = 16 * 3;
 pub(super) struct Ready<'a> {
     pub gaussians: Cow<'a, [Gaussian]>,
     pub harmonics: Cow<'a, Harmonics>,
-    /// The parameters of a static scene, whose scales, rotations and opacities are exported as they are.
+    /// The parameters of a static scene, whose scales, rotations and opacities are exported unchanged.
     at_rest: Option<&'a Parameters>,
     /// Harmonics in time that are evaluated, 0 to 2.
     degree_t: u32,

@@ -1,12 +1,11 @@
 //! The table of the formats of other makes that captures are exported to.
 //!
-//! In: an id or an extension. Out: an [`Export`], with the function that writes its files. A further format is one new file in this folder and
-//! one row of [`EXPORTS`]; the function gets [`Columns`], so that it knows neither packed records nor harmonics in time.
+//! In: an id or an extension. Out: an [`Export`], with the function that writes its files from [`Columns`], which have
+//! neither packed records nor harmonics in time. A further format is a file in this folder and a row of [`EXPORTS`].
 
-pub(crate) use super::clip::Clip;
+use super::clip::Clip;
 use super::error::ExportError;
-use super::{gltf, ply, sog, splat, spz, usd};
-use crate::codec::fourdgs;
+use super::{fourdgs, gltf, ply, sog, splat, spz, usd};
 use crate::codec::import::columns::Columns;
 use std::io::{self, Write};
 
@@ -21,12 +20,12 @@ pub struct Export {
     pub extension: &'static str,
     /// What a file holds, and the function that writes it.
     pub(crate) what: What,
-    /// Whether a file has the coordinates of the capture, with its origin and the axis that points up. Files of other formats that have an axis of
-    /// their own are rotated to it.
+    /// Whether a file has the coordinates of the capture, with its origin and the axis that points up. Files of other
+    /// formats that have an axis of their own are rotated to it.
     pub(crate) has_space: bool,
-    /// Whether a file says that the capture was trained with the filter of Mip-Splatting.
+    /// Whether a file states that the capture was trained with the filter of Mip-Splatting.
     pub(crate) has_mip_filter: bool,
-    /// Returns the farthest coordinate that a file of some Gaussians holds, capture units; those beyond are left out. `None`: it holds all.
+    /// The farthest coordinate in a file of some Gaussians, capture units; those beyond are left out. `None`: all fit.
     pub(crate) farthest: Option<fn(&Columns) -> f32>,
     /// What the format cannot hold, whatever the capture: one sentence each.
     pub lost: &'static [&'static str],
@@ -37,8 +36,8 @@ pub struct Export {
 pub(crate) enum What {
     /// The Gaussians at one time, at rest: [`Columns`] without motion and filter, as `instant::at` returns them.
     Instant(Writer),
-    /// All Gaussians with [`Motion`](crate::codec::import::columns::Motion), without a filter, as `moving::moving` returns them. Captures whose
-    /// Gaussians only a filter switches on and off are refused before.
+    /// All Gaussians with [`Motion`](crate::codec::import::columns::Motion), without a filter, as `moving::moving`
+    /// returns them. Captures whose Gaussians only a filter switches on and off are refused before.
     Moving(Writer),
     /// As `Moving`, with the temporal filter of the capture if it has one: its intervals must be written too.
     Windowed(Writer),
@@ -46,7 +45,7 @@ pub(crate) enum What {
     Encoded(Encoder),
 }
 
-/// Writes the file of a format. Colors have time degree 0, opacities are finite logits, quaternions have any length but 0.
+/// Writes the file of a format. Colors have time degree 0, logits of opacities are finite, quaternions are not 0.
 pub(crate) type Writer = fn(&Columns, &Clip, &mut dyn Write) -> io::Result<()>;
 
 /// Encodes the file of a format, and returns a sentence for each thing that it does not hold.

@@ -1,11 +1,12 @@
 //! USD text files (.usda) with a `ParticleField3DGaussianSplat`, which is in version 26.03 of USD and later ones.
 //!
-//! In: [`Columns`] at rest or with motion, and the frames of the clip. Out: the file, +Y up. Of moving Gaussians, positions and opacities have a sample
-//! for each frame; if it takes less space, as with a sequence of separate sets of Gaussians, each frame has all values of its visible ones instead.
+//! In: [`Columns`] at rest or with motion, and the frames of the clip. Out: the file, +Y up. Of moving Gaussians,
+//! positions and opacities have a sample for each frame; if it takes less space, as with a sequence of separate sets of
+//! Gaussians, each frame has all values of its visible ones instead.
 
 use super::clip::Clip;
 use super::y_up::y_up;
-use crate::codec::import::columns::{Columns, Motion};
+use crate::codec::import::columns::{Columns, Motion, sigmoid};
 use crate::gaussian::Lifespan;
 use glam::{Vec3, Vec4};
 use std::io::{self, BufWriter, Write};
@@ -97,11 +98,11 @@ const ATTRIBUTES: &[Attribute] = &[
 
 /// The frames of a file.
 struct Frames {
-    /// The timestamp of each frame; of a still one.
+    /// The timestamp of each frame; a still has one.
     times: Vec<f32>,
     /// Whether values are samples in time.
     moves: bool,
-    /// Whether each frame has its visible Gaussians alone.
+    /// Whether each frame has only its visible Gaussians.
     is_separate: bool,
     interval: [f32; 2],
     cutoff: f32,
@@ -123,7 +124,7 @@ impl Frames {
         let time = |step: u32| (f64::from(first) + f64::from(last - first) * (f64::from(step) / steps)) as f32;
         let times: Vec<f32> = (0..=steps as u32).map(time).collect();
         let mut frames = Self { times, moves, is_separate: false, interval, cutoff };
-        // The numbers in either kind of file.
+        // Numbers of a Gaussian. Frames with all Gaussians sample only 4 of them: position and opacity.
         let values = 11 + columns.harmonics.coefficients * 3;
         let is_visible = |index: usize, time: f32| frames.moment(columns, index, time).opacity > 0.0;
         let visible = |time: f32| (0..columns.len()).filter(|&index| is_visible(index, time)).count();
@@ -141,7 +142,7 @@ impl Frames {
     /// Returns the state of a Gaussian at a time.
     fn moment(&self, columns: &Columns, index: usize, time: f32) -> Moment {
         let mean = Vec3::from(columns.mean[index]);
-        let opacity = 1.0 / (1.0 + (-columns.opacity_logit[index]).exp());
+        let opacity = sigmoid(columns.opacity_logit[index]);
         let is_active = columns
             .filter
             .as_ref()

@@ -42,7 +42,7 @@ fn turned<'c>(columns: &'c Columns, map: &DAffine3) -> io::Result<Cow<'c, Column
 
 /// Returns the rotation from a space in which `up` points up to one in which +Y does.
 fn rotation(up: UpAxis) -> DAffine3 {
-    // Rotations by quarters of a circle, by their columns: no digit of a number changes.
+    // Quarter turns, by their columns: no digit of a number changes.
     let [x, y, z] = match up {
         UpAxis::PosX => [DVec3::Y, DVec3::NEG_X, DVec3::Z],
         UpAxis::NegX => [DVec3::NEG_Y, DVec3::X, DVec3::Z],

@@ -1,6 +1,7 @@
 //! Gaussians in columns, as most formats of other makes have them.
 //!
-//! In: the values that a reader decodes. Out: [`Columns`], converted to a [`GaussianScene`]: at rest in the trained form, moving in the sliced form.
+//! In: the values that a reader decodes. Out: [`Columns`], converted to a [`GaussianScene`]: at rest in the trained
+//! form, moving in the sliced form.
 
 use super::error::ImportError;
 use crate::codec::options::ReadOptions;
@@ -45,7 +46,7 @@ pub(crate) struct Motion {
     pub sigma_t: f32,
 }
 
-/// What a format says, or means, about playing its files. [`ReadOptions`] replace each value.
+/// How the files of a format are played, as they state or imply it. [`ReadOptions`] replace each value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Played {
     /// The axis that points up.
@@ -162,8 +163,8 @@ impl Columns {
     }
 }
 
-/// Returns whether a scene of `all` parts is drawn with the filter of Mip-Splatting, of which `filtered` were trained with it: if all were. If only some
-/// were, also a sentence, which calls them `parts`.
+/// Returns whether a scene is drawn with the filter of Mip-Splatting: if all of its parts were trained with it, of
+/// which `filtered` of `all` were. If only some were, also returns a sentence that calls them `parts`.
 pub(crate) fn mip_filter_of(filtered: usize, all: usize, parts: &str) -> (bool, Option<String>) {
     let is_mixed = filtered > 0 && filtered < all;
     let sentence = format!(
@@ -177,6 +178,11 @@ pub(crate) fn mip_filter_of(filtered: usize, all: usize, parts: &str) -> (bool, 
 pub(crate) fn logit(opacity: f32) -> f32 {
     let opacity = f64::from(opacity).clamp(1e-7, 1.0 - 1e-7);
     (opacity / (1.0 - opacity)).ln() as f32
+}
+
+/// Returns the opacity of a logit.
+pub(crate) fn sigmoid(logit: f32) -> f32 {
+    1.0 / (1.0 + (-logit).exp())
 }
 
 /// The factor of the coefficient of degree 0: 1 / (2 √π).

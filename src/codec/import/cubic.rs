@@ -1,7 +1,7 @@
 //! Gaussians on cubic paths, as SpacetimeGaussians trains them.
 //!
-//! In: columns of Gaussians with velocities and lifespans, and how each path [bends](Bend). Out: [`Imported`], with a straight piece for each part
-//! of a path.
+//! In: columns of Gaussians with velocities and lifespans, and how each path [bends](Bend). Out: [`Imported`], with a
+//! straight piece for each part of a path.
 
 use super::columns::{Columns, Played};
 use super::drawable::keep_drawable_and;
@@ -15,7 +15,7 @@ use crate::scene::{MAX_SEGMENTS, UpAxis};
 use glam::{DQuat, DVec3, DVec4};
 use std::f32::consts::FRAC_1_SQRT_2;
 
-/// Frames of the clips that SpacetimeGaussians trains unless it is told another number.
+/// Default number of frames of a clip of SpacetimeGaussians.
 const FRAMES: f32 = 50.0;
 
 /// How a path differs from a straight line, and how the Gaussian turns; `d` is the time since `mean_t`.
@@ -36,12 +36,13 @@ impl Bend {
     }
 }
 
-/// Returns the temporal deviation of an envelope exp(−(d/width)²), infinite for a width that was too large for its format.
+/// Returns the temporal deviation of an envelope exp(−(d/width)²), infinite for a width too large for its format.
 pub(crate) fn sigma_of_width(width: f32) -> f32 {
     if width.is_finite() { width * FRAC_1_SQRT_2 } else { f32::INFINITY }
 }
 
-/// Returns how a clip of SpacetimeGaussians is played, whose file does not have its duration; `lost` gets a sentence about that.
+/// Returns how a clip of SpacetimeGaussians is played. Its file does not have its duration: a sentence about the
+/// assumed one is added to `lost`.
 pub(crate) fn spacetime_clip(options: &ReadOptions, lost: &mut Vec<String>) -> Played {
     let duration_seconds = FRAMES / options.fps.unwrap_or(FPS);
     if options.duration_seconds.is_none() {

@@ -1,6 +1,7 @@
 //! Gaussians that cannot be drawn, which files of trainers have now and then: other players draw the rest of the file.
 //!
-//! In: decoded [`Columns`]. Out: the columns without them, and a sentence that says how many they were; limits in place of infinite logits and scales.
+//! In: decoded [`Columns`]. Out: the columns without them, and a sentence that says how many they were; limits in place
+//! of infinite logits and scales.
 
 use super::columns::{Columns, logit};
 use crate::gaussian::Harmonics;
@@ -8,16 +9,16 @@ use rayon::prelude::*;
 
 /// The logarithm of a scale of 0: far below a pixel in any unit.
 const POINT: f32 = -30.0;
-/// The logarithm of the largest scale whose square, and those of its products, are finite in single precision.
+/// The logarithm of the largest scale, with which covariances, sums of squares, are finite in single precision.
 const LARGEST: f32 = 40.0;
 
-/// Removes the Gaussians that cannot be drawn, and returns a sentence about them if there are any. An opacity of exactly 0 or 1 and a scale of exactly
-/// 0, which have no finite logit and logarithm, become the nearest ones that have.
+/// Removes the Gaussians that cannot be drawn, and returns a sentence about them if there are any. Opacities of 0 and 1
+/// and scales of 0, which have no finite logit and logarithm, become the nearest ones that have.
 pub(crate) fn keep_drawable(columns: &mut Columns) -> Option<String> {
     keep_drawable_and(columns, |_| {})
 }
 
-/// As [`keep_drawable`]; `others` removes the same Gaussians elsewhere, and gets the indices of those that stay.
+/// As [`keep_drawable`]; `others` receives the indices of the Gaussians that stay, to remove the same ones elsewhere.
 pub(crate) fn keep_drawable_and(columns: &mut Columns, others: impl FnOnce(&[usize])) -> Option<String> {
     columns.opacity_logit.par_iter_mut().for_each(|value| {
         if value.is_infinite() {
@@ -43,7 +44,7 @@ pub(crate) fn keep_drawable_and(columns: &mut Columns, others: impl FnOnce(&[usi
                 .get(index)
                 .is_none_or(|motion| finite(&motion.velocity) && motion.mean_t.is_finite() && motion.sigma_t > 0.0)
     };
-    // Usually none is removed, and nothing moves.
+    // Usually none is removed, and nothing is copied.
     if (0..all).into_par_iter().all(|index| is_drawable(&index)) {
         return None;
     }

@@ -7,8 +7,7 @@ use crate::scene::GaussianScene;
 /// A scene of a file of another make.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Imported {
-    /// The scene.
     pub scene: GaussianScene,
-    /// What the file has that the scene does not show, or shows approximately: one sentence each, with numbers where there are any.
+    /// A sentence, with numbers, for each thing of the file that the scene does not show, or shows approximately.
     pub lost: Vec<String>,
 }

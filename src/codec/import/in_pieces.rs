@@ -1,6 +1,6 @@
 //! Gaussians on curved paths as columns of straight pieces.
 //!
-//! In: the columns of the Gaussians, and the [`Pieces`] of their paths. Out: the [`Columns`] of the pieces, and sentences about them.
+//! In: the columns of the Gaussians, the [`Pieces`] of their paths. Out: the [`Columns`] of the pieces, and sentences.
 
 use super::columns::{Columns, Motion, Played};
 use super::error::ImportError;
@@ -8,7 +8,7 @@ use crate::codec::options::ReadOptions;
 use crate::gaussian::Harmonics;
 use crate::scene::pieces::{Bends, MOST, MOST_OF_ONE, Piece, Pieces, Splitting};
 
-/// The tolerance of paths, unless an option says another.
+/// The default tolerance of paths, in middle scales of their Gaussians.
 const TOLERANCE: f32 = 0.25;
 
 /// Returns how paths are split, according to the options.
@@ -37,8 +37,8 @@ pub(crate) fn middle_scale(log_scale: [f32; 3]) -> f32 {
     a.max(b).min(a.min(b).max(c)).exp()
 }
 
-/// Returns the columns of the pieces: scales, opacities, colors and lifespans are those of their Gaussians. `whole` are the columns of the
-/// Gaussians, `sigma_t` their temporal deviations, `rotation` returns the rotation of a piece.
+/// Returns the columns of the pieces: scales, opacities, colors and lifespans are those of their Gaussians. `whole` are
+/// the columns of the Gaussians, `sigma_t` their temporal deviations, `rotation` returns the rotation of a piece.
 pub(crate) fn in_pieces(
     whole: &Columns,
     sigma_t: &[f32],
@@ -65,7 +65,7 @@ pub(crate) fn in_pieces(
     }
 }
 
-/// Returns what the pieces of `paths` paths do not show, and how exactly they show the rest; `given` is the tolerance asked for.
+/// Returns sentences about the differences of pieces from their `paths` paths; `given` is the requested tolerance.
 pub(crate) fn statements(pieces: &Pieces, paths: usize, given: f32) -> Vec<String> {
     let Pieces { pieces: all, error, relative_error, coarse, unseen, tolerance, .. } = pieces;
     let mut lost = vec![format!(

@@ -1,7 +1,8 @@
 //! Captures of the player `GaussianSplats3D` (`.ksplat`).
 //!
-//! In: the bytes of a file: a header, the headers of its sections, then for each section its buckets, which are cubes of space, and its splats, as
-//! floats (level of compression 0) or with 16 bits for each number (1; 2 has 8 bits for colors that depend on the direction). Out: [`Imported`].
+//! In: the bytes of a file: a header, the headers of its sections, then for each section its buckets, which are cubes
+//! of space, and its splats, as floats (level of compression 0) or with 16 bits for each number (1; 2 has 8 bits for
+//! colors that depend on the direction). Out: [`Imported`].
 
 use super::columns::{Columns, Played, coefficient, logit};
 use super::drawable::keep_drawable;
@@ -65,7 +66,7 @@ struct Section<'a> {
     width: usize,
 }
 
-/// Returns whether a file that starts so is such a capture: by its name, unless it is certainly something else, or by its header.
+/// Returns whether a file that starts so is such a capture: by its header, or by its name unless its bytes contradict.
 pub(crate) fn is_of(start: &Start) -> bool {
     let is_named = start.extension == "ksplat" && !start.bytes.is_empty() && !looks::is_other(start);
     is_named || has_header(start)
@@ -218,7 +219,7 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// Appends the coefficients of degrees 1 and above, which are stored degree by degree, and in each first all red ones.
+    /// Appends the coefficients of degrees 1 and above, which are stored by degree, and in each with red first.
     fn append_rest(&self, stored: &[u8], values: &mut Vec<f32>) {
         for degree in 1..=self.degree as usize {
             let (first, count) = (3 * (degree * degree - 1), 2 * degree + 1);
@@ -256,7 +257,7 @@ impl<'a> Section<'a> {
     }
 }
 
-/// Returns the buckets of a section, each its center and its number of splats: first those that are full, then the others with their lengths.
+/// Returns the center and the number of splats of each bucket of a section: first the full buckets, then the others.
 ///
 /// # Errors
 /// Fewer buckets than are stated, or than the splats need.

@@ -1,12 +1,14 @@
 //! Captures of other makes: from their files to scenes.
 //!
-//! In: the bytes of a file, the others of its folder, [`ReadOptions`](super::ReadOptions). Out: [`Imported`]: a scene, and what of the file it does
-//! not show. Each format is one file here, which fills [`Columns`] and calls [`Columns::into_scene`]; `super::format` has the table of formats.
+//! In: the bytes of a file, the others of its folder, [`ReadOptions`](super::ReadOptions). Out: [`Imported`]: a scene,
+//! and what of the file it does not show. Each format is one file here, which fills [`Columns`] and calls
+//! [`Columns::into_scene`]; `super::format` has the table of formats.
 
 pub(crate) mod columns;
 mod cubic;
 pub(crate) mod drawable;
 mod error;
+pub(crate) mod fourdgs;
 pub(crate) mod gltf;
 mod imported;
 pub(crate) mod in_pieces;

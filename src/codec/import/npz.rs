@@ -1,7 +1,7 @@
 //! Parameters of Dynamic 3D Gaussians (`params.npz`): Gaussians that are tracked from frame to frame.
 //!
-//! In: the bytes of a zip archive of arrays. Out: [`Imported`]: each track in straight pieces that end at frames. What the arrays unpack to
-//! is limited by the [`Budget`] of the archive.
+//! In: the bytes of a zip archive of arrays. Out: [`Imported`]: each track in straight pieces that end at frames. The
+//! unpacked size of the arrays is limited by the [`Budget`] of the archive.
 
 use super::columns::{Columns, Played, coefficient};
 use super::error::ImportError;
@@ -66,7 +66,7 @@ impl<'a> Arrays<'a> {
 /// An array of floating-point numbers in C order.
 struct Floats {
     bytes: Vec<u8>,
-    /// Where the values begin.
+    /// Offset of the first value, bytes.
     start: usize,
     is_double: bool,
     shape: Vec<usize>,
@@ -128,7 +128,7 @@ impl Floats {
 /// Reads the parameters.
 ///
 /// # Errors
-/// A damaged archive; arrays that are missing or do not fit each other; Gaussians that cannot be drawn; invalid options.
+/// A damaged archive; arrays that are missing or do not fit; Gaussians that cannot be drawn; invalid options.
 pub(crate) fn read(source: &Source<'_>, options: &ReadOptions) -> Result<Imported, ImportError> {
     let arrays = &mut Arrays::open(source.bytes)?;
     let means = Floats::read(arrays, MEANS)?;

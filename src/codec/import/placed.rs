@@ -1,7 +1,7 @@
-//! Gaussians in another space: turned, mirrored, scaled, moved.
+//! Affine maps of Gaussians: rotation, mirroring, scale, translation.
 //!
-//! In: [`Columns`] and an affine map. Out: the columns in the space that the map leads to, exactly, except that colors which depend on the direction
-//! are turned by the rotation nearest to a map that shears or stretches.
+//! In: [`Columns`] and an affine map. Out: the columns in the space that the map leads to, exactly, except that a map
+//! which shears or stretches rotates view-dependent colors by the nearest rotation.
 
 use super::columns::Columns;
 use super::error::ImportError;
@@ -10,7 +10,7 @@ use crate::gaussian::rotate_harmonics::rotate_harmonics;
 use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3, DVec4};
 use rayon::prelude::*;
 
-/// Largest difference between `RᵀR` and 1 of a matrix that counts as a rotation: transforms in files are single precision.
+/// Largest difference between `RᵀR` and 1 for a rotation: transforms in files are in single precision.
 const ORTHOGONAL: f64 = 1e-5;
 
 /// Smallest variance of a Gaussian that a map has flattened, relative to its largest.
@@ -51,7 +51,7 @@ pub(crate) fn place(columns: &mut Columns, map: &DAffine3) -> Result<bool, Impor
 
 /// Turns and scales covariances by an orthogonal matrix and a factor.
 fn turn_shapes(columns: &mut Columns, turn: DMat3, log_scale: f32) {
-    // An ellipsoid is its own mirror image in its center: `-turn` turns it as `turn` does, and is a rotation if `turn` mirrors.
+    // An ellipsoid is symmetric about its center: `-turn` maps it as `turn` does, and is a rotation if `turn` mirrors.
     let turn = if turn.determinant() < 0.0 { -turn } else { turn };
     let turn = DQuat::from_mat3(&turn).normalize();
     columns.rotation.par_iter_mut().for_each(|rotation| *rotation = from_quat(turn * to_quat(*rotation)));
@@ -154,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rotation_nearest_to_a_rotation_that_stretches_is_that_rotation() {
+    fn the_rotation_nearest_to_a_stretched_rotation_is_that_rotation() {
         let turn = DMat3::from_quat(DQuat::from_xyzw(0.1, 0.7, -0.4, 0.5).normalize());
         for turn in [turn, -turn] {
             let found = nearest_turn(turn * DMat3::from_diagonal(DVec3::new(1.0, 3.0, 0.2)));

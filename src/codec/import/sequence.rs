@@ -1,7 +1,8 @@
 //! A sequence: one file of Gaussians at rest for each frame.
 //!
-//! In: the frames in order, or a folder of numbered PLY files. Out: one scene, in which a temporal filter shows the Gaussians of one frame at a time.
-//! Every frame is exact; nothing is interpolated. A frame is shown until the next one begins: their numbers are times.
+//! In: the frames in order, or a folder of numbered PLY files. Out: one scene, in which a temporal filter shows the
+//! Gaussians of one frame at a time. Every frame is exact; nothing is interpolated. A frame is shown until the next one
+//! begins: the numbers in their names are times.
 
 use super::columns::{Columns, Played, mip_filter_of};
 use super::error::ImportError;
@@ -47,8 +48,8 @@ pub(crate) fn read_folder(folder: &Path, options: &ReadOptions) -> Result<Import
     read(frames, options)
 }
 
-/// Reads frames, each of which is a PLY file of Gaussians at rest. A frame lasts until that of the next number, the last one as long as one number.
-/// Frames without numbers follow one another.
+/// Reads frames, each of which is a PLY file of Gaussians at rest. A frame lasts until that of the next number, the
+/// last one as long as one number. Frames without numbers follow one another.
 ///
 /// # Errors
 /// A frame that cannot be read, by name; more than 65 535 frames, none, invalid options.
@@ -144,8 +145,8 @@ fn at(name: &str, error: ImportError) -> ImportError {
     }
 }
 
-/// Returns the name of the file that follows a frame: its number is one higher, with the same number of digits, or one more after 9, 99 and so
-/// on. Returns `None` for a name without a number.
+/// Returns the name of the file that follows a frame: its number is one higher, with the same number of digits, or one
+/// more after 9, 99 and so on. Returns `None` for a name without a number.
 pub fn next(name: &str) -> Option<String> {
     let (beginning, number) = number(name)?;
     let ending = name.strip_prefix(beginning)?.trim_start_matches(|c: char| c.is_ascii_digit());

@@ -10,7 +10,6 @@ use std::path::Path;
 /// A file to read.
 #[derive(Clone, Copy)]
 pub(crate) struct Source<'a> {
-    /// Its bytes.
     pub bytes: &'a [u8],
     /// The other files.
     pub beside: &'a dyn Beside,

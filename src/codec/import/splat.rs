@@ -1,7 +1,7 @@
 //! `.splat` files: 32 bytes for each Gaussian at rest, without a header.
 //!
-//! In: the bytes of a file, whose length is a multiple of 32. Out: its scene: mean and scales as floats, color and opacity as four bytes, the rotation
-//! (w, x, y, z) as four bytes around 128. Color is not view-dependent.
+//! In: the bytes of a file, whose length is a multiple of 32. Out: its scene: mean and scales as floats, color and
+//! opacity as four bytes, the rotation (w, x, y, z) as four bytes around 128. Color is not view-dependent.
 
 use super::columns::{Columns, Played, coefficient, logit};
 use super::drawable::keep_drawable;
@@ -17,12 +17,12 @@ use crate::scene::UpAxis;
 pub(crate) const EXTENSIONS: &[&str] = &["splat"];
 /// Bytes of a Gaussian.
 const RECORD: usize = 32;
-/// Largest coordinate, and smallest and largest scale, of a file that is recognized by its numbers alone, capture units.
+/// Largest coordinate, and smallest and largest scale, of a file recognized by its numbers alone, capture units.
 const FARTHEST: f32 = 1e6;
 const SCALES: [f32; 2] = [1e-9, 1e5];
 
-/// Returns whether a file that starts so is such a file: by its name, unless it is certainly something else, or by its numbers, if each of its first
-/// records has plausible ones.
+/// Returns whether a file that starts so is such a file: by its name, unless it is certainly something else, or by its
+/// numbers, if each of its first records has plausible ones.
 pub(crate) fn is_of(start: &Start) -> bool {
     let is_named = start.extension == "splat" && !start.bytes.is_empty() && !looks::is_other(start);
     let records = start.bytes.as_chunks::<RECORD>().0;
@@ -108,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_of_this_name_is_another_if_its_bytes_say_so() {
+    fn a_file_named_splat_with_the_bytes_of_another_format_is_not_recognized() {
         assert!(is_of(&start(&record(-1.0, 0.0), "splat")), "odd numbers");
         for other in
             [&b"<!DOCTYPE html>"[..], b"version https://git-lfs.github.com/spec/v1\n", b"\x89PNG\r\n\x1a\n", b""]

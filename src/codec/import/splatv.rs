@@ -1,6 +1,6 @@
 //! Captures of the player splaTV (`.splatv`).
 //!
-//! In: the bytes of a file: a description in JSON, then records of 64 bytes, one for each splat in cubic motion. Out: [`Imported`].
+//! In: the bytes of a file: a description in JSON, then 64 bytes for each splat in cubic motion. Out: [`Imported`].
 
 use super::columns::{Columns, Motion, coefficient, logit};
 use super::cubic::{Bend, imported, sigma_of_width, spacetime_clip};
@@ -47,7 +47,7 @@ pub(crate) fn read(source: &Source<'_>, options: &ReadOptions) -> Result<Importe
         let length = usize::try_from(size).unwrap_or(usize::MAX).min(data.len());
         let (own, others) = data.split_at(length);
         if r#type == "splat" {
-            // The size counts whole rows of a texture; the last row is often cut after its last splat, and otherwise filled with zeros.
+            // The size counts whole rows of a texture; the last row is cut after the last splat, or filled with zeros.
             let records = own.as_chunks::<RECORD>().0;
             let mut columns = Columns::with_capacity(records.len(), 0);
             let mut bends = Vec::with_capacity(records.len());

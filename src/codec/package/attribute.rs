@@ -1,7 +1,6 @@
 //! Attributes: the columns of a scene that sections hold.
 //!
-//! In: the place of a column in a table of words. Out: its [`Attribute`], with its size in memory and in a file, and its
-//! runs of rows.
+//! In: the place of a column in a table of words. Out: its [`Attribute`], with its sizes and its runs of rows.
 
 use std::ops::Range;
 

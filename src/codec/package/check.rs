@@ -128,8 +128,7 @@ impl Header {
         sane(duration.is_finite() && duration >= 0.0, "the playback duration must be a finite number, zero or above")
     }
 
-    /// Checks the numbers of color: valid degrees, and at least as many coefficients as they need; exactly as many in
-    /// codebooks.
+    /// Checks the numbers of color: valid degrees, and enough coefficients for them; in codebooks not more than enough.
     fn check_color(&self) -> Result<(), PackageError> {
         let (found, degree, degree_t) = (self.coefficients, self.degree, self.degree_t);
         if degree > 3 || degree_t > 2 || found > MAX_COEFFICIENTS {

@@ -1,6 +1,6 @@
 //! The fixed start of a package, and its header as bytes.
 //!
-//! In: a [`Header`]. Out: magic, version, length, checksum and RON text; and back, checked against the real length of the file.
+//! In: a [`Header`]. Out: magic, version, length, checksum and RON text; and back, checked against the file length.
 
 use super::error::PackageError;
 use super::header::Header;
@@ -19,7 +19,7 @@ const FIXED: u64 = 20;
 /// Longest header read, bytes. A million Gaussians need a tenth of a megabyte.
 const HEADER_LIMIT: u64 = 16 << 20;
 
-/// Writes the fixed start and the header, after checking that [`read`] will accept both. Returns the length of the whole file.
+/// Writes the fixed start and the header, after checking that [`read`] accepts both. Returns the length of the file.
 pub(super) fn write(writer: &mut impl Write, header: &Header) -> Result<u64, PackageError> {
     let text = header.to_text()?;
     let length = text.len() as u64;
@@ -42,7 +42,7 @@ pub(super) fn read(reader: &mut (impl Read + Seek)) -> Result<(Header, u64), Pac
     if file_length < MAGIC.len() as u64 || bytes::<4>(reader)? != MAGIC {
         return Err(PackageError::NotAPackage);
     }
-    check_room(FIXED, file_length)?;
+    check_file_length(FIXED, file_length)?;
     let version = u32::from_le_bytes(bytes(reader)?);
     if version != VERSION {
         return Err(PackageError::UnsupportedVersion { found: version, known: VERSION });
@@ -50,7 +50,7 @@ pub(super) fn read(reader: &mut (impl Read + Seek)) -> Result<(Header, u64), Pac
     let length = u64::from_le_bytes(bytes(reader)?);
     let stored = u32::from_le_bytes(bytes(reader)?);
     check_length(length)?;
-    check_room(FIXED + length, file_length)?;
+    check_file_length(FIXED + length, file_length)?;
     let mut text = vec![0; length as usize];
     reader.read_exact(&mut text)?;
     if checksum(&text) != stored {
@@ -78,7 +78,7 @@ fn check_length(length: u64) -> Result<(), PackageError> {
     Ok(())
 }
 
-fn check_room(expected: u64, found: u64) -> Result<(), PackageError> {
+fn check_file_length(expected: u64, found: u64) -> Result<(), PackageError> {
     if expected > found {
         return Err(PackageError::Truncated { expected, found });
     }

@@ -1,7 +1,6 @@
 //! Errors of reading and writing packages.
 //!
-//! In: a problem found by the reader or writer. Out: a [`PackageError`], whose message names the problem and the
-//! remedy.
+//! In: a problem of the reader or writer. Out: a [`PackageError`], whose message names the problem and the remedy.
 
 use crate::codec::options::InvalidOption;
 use crate::codec::text::printable;

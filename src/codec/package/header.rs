@@ -1,7 +1,7 @@
 //! The header: the contents of a package and their location.
 //!
-//! In: a scene, or the RON text of a file. Out: a [`Header`], its RON text, and the [`Attribute`]s that it describes, in
-//! the order of the file. `check.rs` has its checks.
+//! In: a scene, or the RON text of a file. Out: a [`Header`], its RON text, and the [`Attribute`]s that it describes,
+//! in the order of the file. `check.rs` has its checks.
 
 use super::attribute::Attribute;
 use super::error::PackageError;

@@ -1,7 +1,7 @@
 //! The values of a scene in memory, as tables of words.
 //!
-//! In: a [`Header`] or a scene. Out: a blank scene of the header's size, made at once or in steps, and the 32-bit words of each attribute of a
-//! scene.
+//! In: a [`Header`] or a scene. Out: a blank scene of the header's size, made at once or in steps, and the 32-bit words
+//! of each attribute of a scene.
 
 use super::header::{Header, StoredForm};
 use crate::gaussian::{Harmonics, Model, Parameters};
@@ -103,7 +103,7 @@ pub(super) fn grow(scene: &mut GaussianScene, header: &Header, bytes: usize) -> 
     zeros.complete
 }
 
-/// Zeros that may still be written, in bytes, and whether all tables so far have all of theirs.
+/// The bytes of zeros that may still be added in a step, and whether all tables so far are complete.
 struct Zeros {
     left: usize,
     complete: bool,
@@ -115,7 +115,7 @@ impl Zeros {
         let (row, missing) = (size_of::<T>(), count.saturating_sub(table.len()));
         let rows = if self.complete { missing.min((self.left / row).max(1)) } else { 0 };
         if rows == count {
-            // Systems have memory of zeros.
+            // The system provides zeroed memory at no cost.
             *table = vec![T::zeroed(); count];
         } else if rows > 0 {
             table.reserve_exact(missing);

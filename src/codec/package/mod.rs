@@ -1,7 +1,6 @@
 //! The package format `.gs4d`: written once, loaded often, with a checksum on every byte.
 //!
-//! In: a [`GaussianScene`]. Out: a file; and from the file the same scene, bit for bit. `docs/format.md` describes the layout
-//! byte by byte.
+//! In: a [`GaussianScene`]. Out: a file, and from it the same scene, bit for bit. `docs/format.md` has the layout.
 //!
 //! A package is a fixed start ([`MAGIC`], [`VERSION`], length and checksum of the header), a [`Header`] in RON, and the
 //! sections that the header lists. A section holds one attribute of a run of Gaussians, split into byte planes
@@ -15,10 +14,10 @@ mod envelope;
 mod error;
 mod header;
 mod layout;
+mod memory_limit;
 mod options;
 mod planes;
 mod reading;
-mod room;
 pub(crate) mod section;
 
 pub use envelope::{MAGIC, VERSION};
@@ -31,16 +30,15 @@ use super::options::ReadOptions;
 use crate::scene::GaussianScene;
 use attribute::Attribute;
 use header::LEVEL;
+use memory_limit::{MemoryLimit, of_level};
 use rayon::prelude::*;
-use room::{Room, of_level};
 use serde::Serialize;
 use std::io::{BufReader, Read, Seek, Write};
 
 /// Extensions of packages, without the dot.
 pub(crate) const EXTENSIONS: &[&str] = &["gs4d"];
 
-/// Largest number of Gaussians per section: small enough to decode one at a time in little memory, large enough to
-/// compress well.
+/// Largest number of Gaussians per section: few enough to decode one in little memory, enough to compress well.
 const ROWS_PER_SECTION: usize = 1 << 14;
 
 /// Largest number of Gaussians per section of records of the packed form, whose columns compress best in one piece.
@@ -85,8 +83,8 @@ impl PackageInfo {
 /// Writes a scene without loss. The same scene and settings give the same bytes.
 ///
 /// # Errors
-/// [`PackageError::Inconsistent`] for a scene whose parts do not fit together, [`PackageError::TooLarge`] for a scene that
-/// compresses so well that a reader would refuse it as a decompression bomb, and errors of the writer.
+/// [`PackageError::Inconsistent`] for a scene whose parts do not fit together, [`PackageError::TooLarge`] for a scene
+/// that compresses so well that a reader would refuse it as a decompression bomb, and errors of the writer.
 pub fn write<W: Write>(mut writer: W, scene: &GaussianScene, settings: &WriteSettings) -> Result<(), PackageError> {
     let mut header = Header::of(scene);
     header.check_writable(scene)?;
@@ -110,9 +108,9 @@ pub fn write<W: Write>(mut writer: W, scene: &GaussianScene, settings: &WriteSet
         bodies.push(body);
     }
     header.sections = sections;
-    let mut room = Room::of(&header, envelope::write(&mut writer, &header)?);
+    let mut memory = MemoryLimit::of(&header, envelope::write(&mut writer, &header)?);
     for (index, body) in bodies[first_level..].iter().enumerate() {
-        room.header_of_level(body).map_err(of_level(index))?;
+        memory.header_of_level(body).map_err(of_level(index))?;
     }
     for body in bodies {
         section::write_body(&mut writer, &body)?;
@@ -123,8 +121,8 @@ pub fn write<W: Write>(mut writer: W, scene: &GaussianScene, settings: &WriteSet
 /// Reads a scene from a reader that contains a package and nothing else. All checksums are verified, also those of
 /// unknown sections. [`Loading`](crate::codec::Loading) does the same in steps.
 ///
-/// Besides the scene, one section at a time is in memory, compressed and decompressed. The parts of the scene fit together
-/// ([`GaussianScene::check`]); whether every Gaussian can be drawn, [`GaussianScene::into_runtime`] checks.
+/// Besides the scene, one section at a time is in memory, compressed and decompressed. The parts of the scene fit
+/// together ([`GaussianScene::check`]); whether every Gaussian can be drawn, [`GaussianScene::into_runtime`] checks.
 ///
 /// # Errors
 /// One [`PackageError`] for each kind of damage.

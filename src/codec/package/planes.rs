@@ -24,8 +24,8 @@ pub(super) fn split(words: &[u32], attribute: &Attribute, rows: Range<usize>) ->
     planes
 }
 
-/// Writes a part of the rows that `planes` holds into the table `words`; the first row of `planes` is 0 in `part`. The lengths must fit:
-/// `4 × width` bytes for each row.
+/// Writes a part of the rows that `planes` holds into the table `words`; the first row of `planes` is 0 in `part`. The
+/// lengths must fit: `4 × width` bytes for each row.
 pub(super) fn join(planes: &[u8], attribute: &Attribute, rows: Range<usize>, part: Range<usize>, words: &mut [u32]) {
     let (count, width) = (rows.len(), attribute.width);
     for (tile, component) in tiles(part.len(), width) {

@@ -1,13 +1,13 @@
-//! The reading of a package in steps, so that a program can go on between them.
+//! Reading a package in steps, so that a program can do other work between them.
 //!
-//! In: a reader that contains a package and nothing else. Out: after any number of steps, its scene. A step makes room for a piece of the scene, reads
-//! a piece of a section, decompresses one, or writes one into the scene.
+//! In: a reader that contains a package and nothing else. Out: after any number of steps, its scene. A step allocates a
+//! piece of the scene, reads a piece of a section, decompresses one, or writes one into the scene.
 
 use super::attribute::Attribute;
 use super::envelope;
 use super::error::PackageError;
 use super::header::{Header, LEVEL};
-use super::room::{Room, of_level};
+use super::memory_limit::{MemoryLimit, of_level};
 use super::section::{Body, Section};
 use super::{layout, options, planes};
 use crate::codec::options::ReadOptions;
@@ -19,7 +19,7 @@ use std::sync::Arc;
 /// A package of which some sections have been read.
 pub(crate) struct Reading<R> {
     reader: BufReader<R>,
-    room: Room,
+    limit: MemoryLimit,
     sections: Sections,
     /// The level of detail that is being read, and those that have been.
     level: Option<(Cursor<Vec<u8>>, Sections)>,
@@ -69,8 +69,8 @@ impl<R: Read + Seek> Reading<R> {
     pub(crate) fn new(reader: R) -> Result<Self, PackageError> {
         let mut reader = BufReader::new(reader);
         let (header, file_length) = envelope::read(&mut reader)?;
-        let room = Room::of(&header, file_length);
-        Ok(Self { reader, room, sections: Sections::new(header), level: None, levels: Vec::new() })
+        let limit = MemoryLimit::of(&header, file_length);
+        Ok(Self { reader, limit, sections: Sections::new(header), level: None, levels: Vec::new() })
     }
 
     /// Does one step, which decompresses or writes about `bytes` at most. Returns whether there is more to do.
@@ -90,7 +90,7 @@ impl<R: Read + Seek> Reading<R> {
         match self.sections.advance(&mut self.reader, bytes)? {
             Step::Part => Ok(true),
             Step::Level(body) => {
-                let (header, start) = self.room.header_of_level(&body).map_err(of_level(index))?;
+                let (header, start) = self.limit.header_of_level(&body).map_err(of_level(index))?;
                 let mut body = Cursor::new(body);
                 body.set_position(start);
                 self.level = Some((body, Sections::new(header)));

@@ -1,7 +1,7 @@
 //! Sections: one attribute of a run of Gaussians, as bytes.
 //!
-//! In: words of a scene. Out: a zstd frame of their byte planes and the entry in the section table; and the frame from a reader, checked.
-//! `reading` decompresses it.
+//! In: words of a scene. Out: a zstd frame of their byte planes and the entry in the section table; and the frame from
+//! a reader, checked. `reading` decompresses it.
 
 use super::attribute::Attribute;
 use super::error::PackageError;
@@ -59,8 +59,7 @@ pub(super) fn encode(
     Ok((section, body))
 }
 
-/// Returns the entry in the section table of a package inside the package, with this index among the sections of its
-/// name.
+/// Returns the entry in the section table of an inner package, with this index among the sections of its name.
 pub(super) fn of_package(name: &str, index: usize, body: &[u8]) -> Section {
     Section {
         name: name.to_owned(),
@@ -97,7 +96,8 @@ impl Section {
         Ok(Body { length: u64::from_le_bytes(prefix), hasher: crc32fast::Hasher::new() })
     }
 
-    /// Reads at most `bytes` more of the body. Returns whether it is complete; then the length before it and the checksum have been checked.
+    /// Reads at most `bytes` more of the body. Returns whether it is complete; then the length before it and the
+    /// checksum have been checked.
     pub(super) fn read_some(
         &self,
         reader: &mut impl Read,

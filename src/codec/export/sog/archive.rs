@@ -1,7 +1,7 @@
 //! A zip archive of uncompressed files.
 //!
-//! In: files by name, in their order. Out: the archive. Its headers have no fields of variable length but the name, so that the offset of each file
-//! is known before the archive is written.
+//! In: files by name, in their order. Out: the archive. Its headers have no fields of variable length but the name, so
+//! that the offset of each file is known before the archive is written.
 
 use std::io::{self, Cursor, Write};
 use zip::write::SimpleFileOptions;

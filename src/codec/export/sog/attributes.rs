@@ -1,7 +1,7 @@
 //! The attributes that all formats of the SOG family have, from columns to textures.
 //!
-//! In: [`Columns`], and their means as they are stored. Out: [`Attributes`]: codes of each Gaussian, and the description of their meaning for
-//! `meta.json`.
+//! In: [`Columns`], and their means as they are stored. Out: [`Attributes`]: codes of each Gaussian, and the
+//! description of their meaning for `meta.json`.
 
 use super::archive::Entry;
 use super::codebook::Codebook;
@@ -62,7 +62,7 @@ impl<'a> Attributes<'a> {
         }
     }
 
-    /// Returns, for each Gaussian, a number by which they can be sorted so that neighbors in space are together: its Morton code.
+    /// Returns the Morton code of each Gaussian: in its order, neighbors in space are together.
     pub(super) fn places(&self) -> Vec<u64> {
         let spread = |code: u16| (0..16).fold(0, |sum, bit| sum | u64::from(code >> bit & 1) << (3 * bit));
         self.means.codes.par_iter().map(|&[x, y, z]| spread(x) | spread(y) << 1 | spread(z) << 2).collect()

@@ -1,7 +1,8 @@
 //! Codebooks of 256 numbers.
 //!
-//! In: numbers. Out: a [`Codebook`] with a small mean square error, by Lloyd's method from entries at even steps of the cube root of the density,
-//! which is the best start for many entries; and the code of each number. The same numbers always give the same codebook.
+//! In: numbers. Out: a [`Codebook`] with a small mean square error, by Lloyd's method from entries at even steps of the
+//! cube root of the density, which is the best start for many entries; and the code of each number. The same numbers
+//! always give the same codebook.
 
 use rayon::prelude::*;
 
@@ -81,7 +82,7 @@ impl Codebook {
     }
 }
 
-/// Returns entries at even steps of the cube root of the density of numbers in ascending order, of which there are more than entries.
+/// Returns entries at even steps of the cube root of the density of more than 256 numbers in ascending order.
 fn by_density(sorted: &[f32]) -> Vec<f64> {
     let bins = (sorted.len() / IN_A_BIN).min(BINS);
     let bound = |bin: usize| f64::from(sorted[bin * (sorted.len() - 1) / bins]);

@@ -1,9 +1,11 @@
-//! Writers of the SOG family: attributes of Gaussians in the texels of lossless WebP textures, in an uncompressed zip archive.
+//! Writers of the SOG family: attributes of Gaussians in lossless WebP textures, in an uncompressed zip archive.
 //!
-//! In: [`Columns`](crate::codec::import::columns::Columns). Out: a `.sog` of Gaussians at rest, or a `.sogst` of moving ones.
+//! In: [`Columns`](crate::codec::import::columns::Columns). Out: a `.sog` of Gaussians at rest, or a `.sogst` of moving
+//! ones.
 //!
-//! `attributes` codes what both have, by `codebook`, `wide`, `palette` and `rotation`; `sogst` adds motion and lifespans, and the groups of
-//! `segments`, which a player draws and loads one after another. `texture` encodes the codes, `archive` holds the files.
+//! `attributes` codes what both have, by `codebook`, `wide`, `palette` and `rotation`; `sogst` adds motion and
+//! lifespans, and the groups of `segments`, which a player draws and loads one after another. `texture` encodes the
+//! codes, `archive` holds the files.
 
 mod archive;
 mod attributes;

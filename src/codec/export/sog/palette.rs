@@ -1,14 +1,15 @@
 //! A palette of coefficients of degree 1 and above.
 //!
-//! In: a row of numbers for each Gaussian. Out: [`Palette`]: rows that stand for similar ones, and the label of each Gaussian. The rows are divided in
-//! two where they differ most until there are enough parts, then each row moves to the nearest part among its neighbors in that order. The time
-//! is that of sorting, unlike that of k-means over all pairs, and the same rows always give the same palette.
+//! In: a row of numbers for each Gaussian. Out: [`Palette`]: rows that stand for similar ones, and the label of each
+//! Gaussian. The rows are divided in two where they differ most until there are enough parts, then each row moves to
+//! the nearest part among its neighbors in that order. The time is that of sorting, unlike that of k-means over all
+//! pairs, and the same rows always give the same palette.
 
 use rayon::prelude::*;
 
 /// Largest number of rows of a palette: labels have 16 bits.
 const MOST: usize = 1 << 16;
-/// Parts beside that of a row among which it looks for a nearer one, and how often.
+/// Parts on either side of the part of a row that are searched for a nearer one, and the number of such passes.
 const NEIGHBORS: usize = 16;
 const STEPS: usize = 3;
 /// Rows that are divided by one thread.
@@ -82,7 +83,7 @@ impl<'i> Part<'i> {
         Self { members, mean, spread }
     }
 
-    /// Divides the rows into at most `parts` parts, and returns the number of rows in each; the members of a part are then together.
+    /// Divides the rows into at most `parts` parts, puts the members of each together, and returns their lengths.
     fn divided(self, values: &[f32], width: usize, parts: usize) -> Vec<usize> {
         let widest =
             (1..width).fold(0, |most, column| if self.spread[column] > self.spread[most] { column } else { most });
@@ -189,7 +190,7 @@ mod tests {
             (squares.sum::<f64>() / 24.0).sqrt()
         };
         let errors: Vec<f64> = values.chunks(24).zip(&labels).map(error).collect();
-        // A row can be left beside a part that is far from it in the order.
+        // The nearest part of a row can be too far away in the order to be found.
         let (near, far): (Vec<f64>, Vec<f64>) = errors.into_iter().partition(|&error| error < 0.1);
         assert!(far.len() <= 20, "{} of 20,000 rows have the center of others", far.len());
         let mean = (near.iter().map(|error| error * error).sum::<f64>() / near.len() as f64).sqrt();

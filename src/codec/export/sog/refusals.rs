@@ -1,4 +1,4 @@
-//! Tests of the SOG family: damaged files are refused, and other versions and formats of the family are read from the same textures.
+//! Tests of the SOG family: damaged files are refused; other versions and formats are read from the same textures.
 //!
 //! In: files of the writers with another `meta.json`, or with other bytes. Out: proof that each fault has its message.
 

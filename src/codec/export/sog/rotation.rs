@@ -1,6 +1,6 @@
 //! Rotations as three bytes.
 //!
-//! In: a quaternion w, x, y, z of any length. Out: the texel with the components but the largest one.
+//! In: a quaternion w, x, y, z of any length. Out: the texel with all components but the largest.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 

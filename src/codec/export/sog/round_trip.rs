@@ -1,6 +1,6 @@
 //! Tests of the SOG family: what is written is read again.
 //!
-//! In: Gaussians made here. Out: proof that the scene of their file has them, within the steps of the codes; the file, for other tests.
+//! In: Gaussians made here. Out: proof that the scene of their file has them, within the steps of the codes; the file.
 
 use super::archive::Entry;
 use crate::codec::export::clip::Clip;

@@ -1,7 +1,7 @@
 //! Segments of a `.sogst`: the Gaussians in groups by time, of which a player draws and loads only some.
 //!
-//! In: the lifespan of each Gaussian, in seconds. Out: [`Segments`]: the duration of a segment with which players draw the fewest Gaussians, and the
-//! group of each Gaussian.
+//! In: the lifespan of each Gaussian, in seconds. Out: [`Segments`]: the duration of a segment with which players draw
+//! the fewest Gaussians, and the group of each Gaussian.
 
 use crate::gaussian::Lifespan;
 use rayon::prelude::*;
@@ -36,7 +36,7 @@ pub(super) struct Segment {
 }
 
 impl Segments {
-    /// Returns the segments of Gaussians in a clip from `first` to `last` second. Those of a group are in the order of `places`.
+    /// Returns the segments of Gaussians in a clip from `first` to `last` second; groups are in the order of `places`.
     pub(super) fn of(lifespans: &[Lifespan], [first, last]: [f64; 2], places: &[u64]) -> Self {
         let candidates: Vec<Self> = NUMBERS
             .par_iter()
@@ -85,7 +85,8 @@ impl Segments {
         Self { duration, order: groups.concat(), persistent, list }
     }
 
-    /// Returns the mean number of Gaussians that a player draws: those of every time, and all from the first to the last segment of a time.
+    /// Returns the mean number of drawn Gaussians: those of every time, and all from the first to the last active
+    /// segment.
     fn drawn(&self, [first, last]: [f64; 2]) -> f64 {
         const TIMES: usize = 256;
         let at = |step: usize| {

@@ -1,9 +1,10 @@
 //! `.sogst` of Solipsist Studios, version 1: Gaussians with motion and lifespans in seconds, for players on the web.
 //!
-//! In: moving [`Columns`]. Out: a zip archive of `meta.json` and of textures for each group of Gaussians, in the order in which a player needs them.
+//! In: moving [`Columns`]. Out: a zip archive of `meta.json` and of textures for each group of Gaussians, in the order
+//! in which a player needs them.
 //!
-//! The temporal mean is coded first, and the mean is that at the coded time: so the line of a Gaussian stays, and only its envelope moves by the
-//! error of the code.
+//! The temporal mean is coded first, and the mean is evaluated at the coded time: the path of a Gaussian does not
+//! change, and only its envelope moves by the error of the code.
 
 use super::archive::{self, Entry};
 use super::attributes::{Attributes, Texels, encode};
@@ -18,7 +19,7 @@ use rayon::prelude::*;
 use serde_json::{Value, json};
 use std::io::{self, Write};
 
-/// The temporal deviation of a Gaussian that is present at every time, in clips: its marginal is 1 in single precision.
+/// Temporal deviation of a Gaussian that is always present, in clip lengths: its marginal is 1 in single precision.
 const ALWAYS: f64 = 1e4;
 
 /// Time in seconds.
@@ -105,8 +106,8 @@ pub(in crate::codec::export) fn write(columns: &Columns, clip: &Clip, writer: &m
     archive::write([&meta].into_iter().chain(geometry.iter().flatten()).chain(&colors), writer)
 }
 
-/// Returns `meta.json` with the offsets in the archive at which a player can begin, and at which view-dependent color begins. They depend on the
-/// length of the text in which they are; a larger offset never has a shorter one, so the repetition ends.
+/// Returns `meta.json` with the offsets in the archive at which a player can begin, and at which view-dependent color
+/// begins. They depend on the length of their own text; a larger offset never shortens it, so the repetition ends.
 fn with_offsets(mut meta: Value, first: usize, all: usize) -> io::Result<Entry> {
     let mut entry = Entry { name: "meta.json".to_owned(), bytes: Vec::new() };
     loop {

@@ -1,6 +1,6 @@
 //! Numbers of 16 bits, linear in their signed logarithms.
 //!
-//! In: three numbers for each Gaussian. Out: [`Wide`], their codes between the limits of each axis, as two textures of bytes.
+//! In: three numbers for each Gaussian. Out: [`Wide`], their codes between the limits of each axis, in two textures.
 
 use rayon::prelude::*;
 use serde_json::{Value, json};

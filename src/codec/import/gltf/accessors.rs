@@ -8,15 +8,12 @@ use crate::codec::import::error::ImportError;
 
 /// The accessors of a document.
 pub(super) struct Accessors<'a> {
-    /// The document.
     pub document: &'a Document,
-    /// The bytes of its buffers.
     pub buffers: Buffers<'a>,
 }
 
 /// An accessor and the bytes of its rows.
 pub(super) struct Rows<'a> {
-    /// The accessor.
     pub accessor: &'a Accessor,
     /// Components in a row.
     pub components: usize,
@@ -28,7 +25,7 @@ pub(super) struct Rows<'a> {
 }
 
 impl Accessors<'_> {
-    /// Returns the rows of an accessor that holds the attribute `name`. The buffer is as long as the number of rows promises.
+    /// Returns the rows of an accessor that holds the attribute `name`. The buffer is checked to hold all rows.
     ///
     /// # Errors
     /// An accessor that does not exist, has no buffer view, is sparse, of an unknown type, or exceeds its buffer view.

@@ -1,6 +1,6 @@
 //! The buffers of a glTF file.
 //!
-//! In: the document, the binary chunk, the files beside the file. Out: [`Buffers`], with the bytes of every buffer view, checked.
+//! In: the document, the binary chunk, the files beside the file. Out: [`Buffers`], with the bytes of each buffer view.
 
 use super::document::Document;
 use crate::codec::import::error::ImportError;
@@ -11,7 +11,7 @@ use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-/// Base64 with or without its padding, as writers of data URIs have it.
+/// Base64 with or without padding: writers of data URIs differ.
 const BASE64: GeneralPurpose = GeneralPurpose::new(
     &STANDARD,
     GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
@@ -28,7 +28,7 @@ impl<'a> Buffers<'a> {
     /// Loads all buffers.
     ///
     /// # Errors
-    /// A file that cannot be read or is outside of the folder; damaged base64; a buffer that is shorter than the document says.
+    /// A file that cannot be read or is outside of the folder; damaged base64; a buffer shorter than stated.
     pub(super) fn of(
         document: &'a Document,
         binary: Option<&'a [u8]>,

@@ -1,14 +1,14 @@
-//! Colors of linear light as the colors that are blended here.
+//! Conversion of linear colors to the sRGB-encoded colors that are blended.
 //!
-//! In: harmonics of linear Rec. 709 colors. Out: harmonics of sRGB-encoded colors. The mean color of a Gaussian is exact; what depends on the direction
-//! is scaled by the slope of the encoding there, as for small changes.
+//! In: harmonics of linear Rec. 709 colors. Out: harmonics of sRGB-encoded colors. The mean color of a Gaussian is
+//! exact; the view-dependent part is scaled by the slope of the encoding at that color, which is exact to first order.
 
 use crate::codec::import::columns::SH_C0;
 use crate::gaussian::Harmonics;
 use crate::view::srgb;
 use glam::Vec3;
 
-/// Where the encoding changes from a line to a power.
+/// The linear value at which the encoding changes from a line to a power.
 const LINE: f32 = 0.003_130_8;
 
 /// Encodes colors.
@@ -40,7 +40,7 @@ mod tests {
     use crate::codec::import::columns::coefficient;
 
     #[test]
-    fn small_changes_of_a_color_are_encoded_as_the_color_is() {
+    fn view_dependent_colors_are_encoded_to_first_order() {
         let linear = [0.001, 0.2140, 0.8];
         let mut harmonics = Harmonics { coefficients: 4, degree: 1, degree_t: 0, values: vec![0.0; 12] };
         for (channel, linear) in linear.into_iter().enumerate() {

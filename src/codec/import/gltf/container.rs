@@ -21,10 +21,11 @@ pub(super) struct Container<'a> {
     pub binary: Option<&'a [u8]>,
 }
 
-/// Keys of which a document has some, beside `asset`.
+/// Keys of which a document has at least one, beside `asset`.
 const KEYS: [&str; 6] = ["\"accessors\"", "\"bufferViews\"", "\"buffers\"", "\"meshes\"", "\"nodes\"", "\"scenes\""];
 
-/// Returns whether a file that starts so is a glTF file. Of text the name of the file, an early mention of the extension, or the keys of glTF tell.
+/// Returns whether a file that starts so is a glTF file. Text is recognized by the name of the file, an early mention
+/// of the extension, or the keys of glTF.
 pub(crate) fn is_of(start: &Start) -> bool {
     let has_keys = || start.mentions("\"asset\"") && KEYS.iter().any(|key| start.mentions(key));
     let is_text = || start.extension == "gltf" || start.mentions("\"KHR_gaussian_splatting\"") || has_keys();
@@ -32,7 +33,7 @@ pub(crate) fn is_of(start: &Start) -> bool {
 }
 
 impl<'a> Container<'a> {
-    /// Parts a file.
+    /// Splits a file into its parts.
     ///
     /// # Errors
     /// A binary file that is cut, of another version, or without JSON.

@@ -1,11 +1,10 @@
 //! The JSON of a glTF file, as far as Gaussians need it.
 //!
-//! In: text. Out: [`Document`]. Properties that are not named here are ignored; indices are checked where they are used.
+//! In: text. Out: [`Document`]. Other properties are ignored; indices are checked where they are used.
 
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
-/// A document.
 #[derive(Debug, Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
 pub(super) struct Document {
@@ -39,7 +38,6 @@ pub(super) struct Node {
     pub scale: Option<[f64; 3]>,
 }
 
-/// A mesh.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 pub(super) struct Mesh {
@@ -88,7 +86,6 @@ pub(super) struct Compressed {
     pub buffer_view: usize,
 }
 
-/// An accessor.
 #[derive(Debug, Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
 pub(super) struct Accessor {
@@ -122,7 +119,6 @@ pub(super) struct Buffer {
     pub byte_length: usize,
 }
 
-/// An animation.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 pub(super) struct Animation {
@@ -130,7 +126,7 @@ pub(super) struct Animation {
     pub samplers: Vec<Sampler>,
 }
 
-/// A channel: what a sampler moves.
+/// The property of a node that a sampler moves.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 pub(super) struct Channel {
@@ -146,7 +142,6 @@ pub(super) struct Target {
     pub path: String,
 }
 
-/// A sampler.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 pub(super) struct Sampler {

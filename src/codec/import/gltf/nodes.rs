@@ -1,7 +1,7 @@
 //! The hierarchy of nodes.
 //!
-//! In: the nodes of a document. Out: the meshes that its scene shows, each with the transformation to the space of the scene. Nodes that an animation
-//! moves stand where its first key frame puts them.
+//! In: the nodes of a document. Out: the meshes that its scene shows, each with the transformation to the space of the
+//! scene. Animated nodes have the pose of the first key frame.
 
 use super::accessors::Accessors;
 use super::document::{Document, Node};
@@ -70,7 +70,7 @@ fn poses(accessors: &Accessors<'_>) -> Result<(Vec<DAffine3>, usize), ImportErro
     let document = accessors.document;
     let mut poses: Vec<Pose> = document.nodes.iter().map(Pose::of).collect();
     let mut moves = vec![false; poses.len()];
-    // The first animation decides where several move a node.
+    // If several animations move a node, the first one decides.
     for animation in document.animations.iter().rev() {
         for channel in &animation.channels {
             let Some(node) = channel.target.node else { continue };
@@ -128,7 +128,7 @@ impl Pose {
         if let Some(matrix) = &self.matrix {
             return DAffine3::from_mat4(DMat4::from_cols_array(matrix));
         }
-        // A quaternion of length zero turns nothing.
+        // A quaternion of length zero is read as no rotation.
         let rotation = DQuat::from_array(self.rotation);
         let length = rotation.length();
         let rotation = if length > 0.0 && length.is_finite() { rotation / length } else { DQuat::IDENTITY };

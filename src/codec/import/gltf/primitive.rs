@@ -1,6 +1,6 @@
 //! The Gaussians of a primitive.
 //!
-//! In: a primitive with `KHR_gaussian_splatting`. Out: [`Columns`] in the space of its mesh, with colors as they are stored.
+//! In: a primitive with `KHR_gaussian_splatting`. Out: [`Columns`] in the space of its mesh, with colors as stored.
 
 use super::accessors::{Accessors, Rows};
 use super::document::{Document, Primitive, Splatting};
@@ -42,7 +42,8 @@ pub(super) fn checked(splatting: &Splatting) -> Result<ColorSpace, ImportError> 
     }
 }
 
-/// Returns whether the scales of a file are logarithms, as in drafts of the extension: one of them is negative, or of a type with a sign for integers.
+/// Returns whether the scales of a file are logarithms, as in drafts of the extension: one of them is negative, or of a
+/// type with a sign for integers.
 ///
 /// # Errors
 /// Damaged accessors.
@@ -80,7 +81,7 @@ pub(super) fn columns(
     has_log_scales: bool,
 ) -> Result<(Columns, Vec<String>), ImportError> {
     if let Some(compressed) = &splatting.extensions.spz {
-        // The draft says that the file is decoded to left, up, front, which viewers do not: they take its axes as those of the mesh.
+        // Viewers omit the conversion to left, up, front that the draft demands: its axes are those of the mesh.
         return spz::columns(accessors.buffers.view(compressed.buffer_view)?);
     }
     let mut lost = Vec::new();

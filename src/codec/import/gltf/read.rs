@@ -1,6 +1,7 @@
 //! The scene of a glTF file.
 //!
-//! In: a file and its buffers. Out: one scene with the Gaussians of all nodes, in the space of the file, +Y up, and what of the file it does not show.
+//! In: a file and its buffers. Out: one scene with the Gaussians of all nodes, in the space of the file, +Y up, and
+//! what of the file it does not show.
 
 use super::accessors::Accessors;
 use super::buffers::Buffers;
@@ -35,7 +36,7 @@ const NUMBERS_PER_BYTE: usize = 16;
 /// Reads a file.
 ///
 /// # Errors
-/// A file that is damaged, without Gaussians, or that needs what is not read here; invalid options.
+/// A file that is damaged, without Gaussians, or requires an unknown extension; invalid options.
 pub(crate) fn read(source: &Source<'_>, options: &ReadOptions) -> Result<Imported, ImportError> {
     let container = Container::of(source.bytes)?;
     let document: Document = json::parse(container.json)
@@ -121,10 +122,14 @@ fn parts(accessors: &Accessors<'_>, lost: &mut Vec<String>) -> Result<Vec<Column
         linear,
         " Gaussians have linear colors; encoded as sRGB and blended so, overlaps look slightly different.",
     );
-    state("", sheared, " Gaussians are stretched by their nodes; colors that depend on the direction are only turned.");
-    state("", tangential, " Gaussians are meant for another projection than perspective, by which they are drawn.");
+    state("", sheared, " Gaussians are stretched by their nodes; their view-dependent colors are only rotated.");
+    state(
+        "",
+        tangential,
+        " Gaussians are meant for a projection other than perspective, and are drawn in perspective.",
+    );
     state("Primitives without Gaussians are left out (", others, ").");
-    state("Animations are left out: the nodes that move (", moved, ") stand where the first key frame puts them.");
+    state("Animations are left out: the nodes that move (", moved, ") have the pose of the first key frame.");
     Ok(parts)
 }
 
@@ -242,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn text_with_buffers_inside_or_beside_and_binary_files_hold_the_same() {
+    fn text_and_binary_files_are_read_as_the_same_scene() {
         let (mut document, buffer) = document();
         let expected = imported(&binary(&document, &buffer), &InMemory::default()).expect("a binary file");
         assert_eq!(expected.lost, [""; 0], "nothing is lost");
@@ -268,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn transformations_of_nodes_are_those_of_their_gaussians() {
+    fn gaussians_have_the_transformations_of_their_nodes() {
         let half = std::f64::consts::FRAC_1_SQRT_2;
         let found = changed(|document| {
             document["nodes"] = json!([
@@ -356,7 +361,7 @@ mod tests {
     }
 
     #[test]
-    fn colors_of_vertices_replace_harmonics_that_are_missing() {
+    fn vertex_colors_replace_missing_harmonics() {
         let found = changed(|document| {
             let attributes = document["meshes"][0]["primitives"][0]["attributes"].as_object_mut().expect("attributes");
             attributes.retain(|name, _| !name.contains("SH_") && !name.contains("OPACITY"));
@@ -411,7 +416,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_read_is_refused_by_its_name() {
+    fn unsupported_and_missing_parts_are_refused_by_name() {
         type Change = fn(&mut Value);
         let cases: [(&str, Change); 12] = [
             ("customShape", |document| {
@@ -448,7 +453,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_that_promise_more_than_there_is_are_refused() {
+    fn counts_and_lengths_beyond_the_file_are_refused() {
         let places = [
             ("/accessors/0", "count"),
             ("/accessors/5", "byteOffset"),

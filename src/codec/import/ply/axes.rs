@@ -1,9 +1,9 @@
 //! The axis of a PLY file that points up.
 //!
-//! In: the comments of a header. Out: the axis that they name: `gs4d.up +z` in files of this crate, `Vertical Axis: z` in those of nerfstudio and Brush.
+//! In: the comments of a header. Out: the axis that they name: `gs4d.up +z` in files of this crate, `Vertical Axis: z`
+//! in those of nerfstudio and Brush.
 
 use super::header::Comments;
-use crate::codec::checkpoint::options::axis;
 use crate::scene::UpAxis;
 
 /// The comment with the axis that points up in files of this crate.
@@ -14,7 +14,7 @@ const VERTICAL: &str = "vertical axis:";
 /// Returns the axis that points up; `None` without such a comment.
 pub(super) fn up(comments: &Comments) -> Option<UpAxis> {
     use UpAxis::{NegX, NegY, NegZ, PosX, PosY, PosZ};
-    let of_name = |name: &str| [PosX, NegX, PosY, NegY, PosZ, NegZ].into_iter().find(|&up| axis(up) == name);
+    let of_name = |name: &str| [PosX, NegX, PosY, NegY, PosZ, NegZ].into_iter().find(|&up| up.name() == name);
     comments.value(UP).and_then(of_name).or_else(|| comments.0.iter().rev().find_map(|comment| vertical(comment)))
 }
 

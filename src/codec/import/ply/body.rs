@@ -1,7 +1,7 @@
 //! The body of a PLY file.
 //!
-//! In: a header and the bytes after it. Out: a [`Table`] for each element without lists; elements with lists are skipped. Bytes of a binary body are
-//! borrowed, numbers of an ASCII body are converted.
+//! In: a header and the bytes after it. Out: a [`Table`] for each element without lists; elements with lists are
+//! skipped. Bytes of a binary body are borrowed, numbers of an ASCII body are converted.
 
 use super::header::{Element, Encoding, Header, Kind, Property};
 use super::scalar::Scalar;
@@ -12,7 +12,7 @@ use std::borrow::Cow;
 /// Returns the tables of a file.
 ///
 /// # Errors
-/// A body that is shorter than the header says; a word of an ASCII body that is not the number that it should be.
+/// A body that is shorter than the header says; a word of an ASCII body that is not a number of its type.
 pub(super) fn tables<'a>(header: &Header, bytes: &'a [u8]) -> Result<Vec<Table<'a>>, ImportError> {
     let body = bytes.get(header.length..).unwrap_or(&[]);
     let mut tables = Vec::new();
@@ -86,8 +86,8 @@ fn length_of_lists(element: &Element, bytes: &[u8], is_big: bool) -> Option<usiz
     Some(at)
 }
 
-/// Converts the rows of an element of an ASCII body to little-endian bytes; `None` if it has lists, whose words are skipped. `left` is the most
-/// bytes that the words may have.
+/// Converts the rows of an element of an ASCII body to little-endian bytes; `None` if it has lists, whose words are
+/// skipped. `left` is the most bytes that the words may have.
 fn ascii_rows<'a>(
     element: &Element,
     words: &mut impl Iterator<Item = &'a [u8]>,

@@ -14,7 +14,7 @@ use std::f32::consts::SQRT_2;
 /// Gaussians of a chunk.
 const CHUNK: usize = 256;
 
-/// Reads Gaussians at rest, with the origin that is given or follows from their places; sentences about these are added to `lost`.
+/// Reads Gaussians at rest, with the origin that is given or follows from their places. Sentences are added to `lost`.
 ///
 /// # Errors
 /// Chunks, or colors, of another number of Gaussians; a property that is missing.
@@ -63,15 +63,15 @@ pub(super) fn columns(
     })
 }
 
-/// Reads the colors of `count` Gaussians: red, green and blue in a word, in the boxes of the chunks if there are any; higher degrees in a table of
-/// their own.
+/// Reads the colors of `count` Gaussians: red, green and blue in a word, in the boxes of the chunks if there are any;
+/// higher degrees in a table of their own.
 fn harmonics(
     tables: &[Table<'_>],
     chunk: &Table<'_>,
     color: Column<'_>,
     count: usize,
 ) -> Result<Harmonics, ImportError> {
-    // Files before the boxes of colors have colors from 0 to 1.
+    // Older files have no boxes of colors: their colors are from 0 to 1.
     let colors = if chunk.has("min_r") {
         Some((chunk.all(["min_r", "min_g", "min_b"])?, chunk.all(["max_r", "max_g", "max_b"])?))
     } else {
@@ -109,17 +109,18 @@ fn harmonics(
     Ok(Harmonics { coefficients, degree, degree_t: 0, values })
 }
 
-/// Returns three parts of 1, in 11, 10 and 11 bits.
+/// Returns the three fractions, from 0 to 1, in 11, 10 and 11 bits of a word.
 fn parts(word: u32) -> [f32; 3] {
     [(word >> 21) as f32 / 2047.0, (word >> 11 & 1023) as f32 / 1023.0, (word & 2047) as f32 / 2047.0]
 }
 
-/// Returns four parts of 1, the first in the highest byte.
+/// Returns the four fractions, from 0 to 1, in the bytes of a word, the highest byte first.
 fn bytes(word: u32) -> [f32; 4] {
     word.to_be_bytes().map(|byte| f32::from(byte) / 255.0)
 }
 
-/// Returns the quaternion w, x, y, z of three components in 10 bits each and the index of the fourth, which is the largest, in the highest two bits.
+/// Returns the quaternion w, x, y, z of three components in 10 bits each and the index of the fourth, which is the
+/// largest, in the highest two bits.
 fn quaternion(word: u32) -> [f32; 4] {
     let largest = (word >> 30) as usize;
     let mut components = [20, 10, 0].map(|shift| ((word >> shift & 1023) as f32 / 1023.0 - 0.5) * SQRT_2).into_iter();
@@ -135,7 +136,7 @@ fn quaternion(word: u32) -> [f32; 4] {
     quaternion
 }
 
-/// Returns a coefficient above degree 0 of its byte. The ends are exact, the others the middles of their steps.
+/// Returns a coefficient above degree 0 from its byte. The ends are exact, the others are the middles of their steps.
 fn rest_value(byte: u32) -> f32 {
     let part = match byte {
         0 => 0.0,

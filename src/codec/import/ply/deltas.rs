@@ -1,7 +1,7 @@
 //! Frames of motion in a PLY file, as Brush plays them: each adds changes to the Gaussians of the element `vertex`.
 //!
-//! In: the elements `delta_vertex_*`, one for each frame, whose values are parts of the ranges in `meta_delta_min_*` and `meta_delta_max_*` before
-//! them. Out: [`Imported`]: the path of each Gaussian in straight pieces that end at frames.
+//! In: the elements `delta_vertex_*`, one for each frame, with values in the ranges of `meta_delta_min_*` and
+//! `meta_delta_max_*` before them. Out: [`Imported`]: the path of each Gaussian in straight pieces that end at frames.
 
 use super::table::{Column, Table};
 use crate::codec::import::columns::{Columns, Played};
@@ -24,7 +24,7 @@ pub(super) fn is_element(name: &str) -> bool {
     [FRAME, LOW, HIGH].iter().any(|beginning| name.starts_with(beginning))
 }
 
-/// The changes of a frame; `None` of values that stay as they are.
+/// The changes of a frame; `None` for values that do not change.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Frame<'a> {
     mean: Option<[Change<'a>; 3]>,
@@ -90,7 +90,8 @@ pub(super) fn frames<'a>(tables: &'a [Table<'_>], count: usize) -> Result<Vec<Fr
     Ok(frames)
 }
 
-/// Returns the changes of some values; `None` if the frame does not have all of them. Without ranges, parts are the changes themselves.
+/// Returns the changes of some values; `None` if the frame does not have all of them. Without ranges, values are
+/// changes.
 fn columns<'a, const N: usize>(
     table: &'a Table<'_>,
     names: [&str; N],

@@ -1,6 +1,7 @@
 //! The header of a PLY file.
 //!
-//! In: the bytes of a file. Out: [`Header`]: how its numbers are written, its comments, its elements with their properties, where the body begins.
+//! In: the bytes of a file. Out: [`Header`]: how its numbers are written, its comments, its elements with their
+//! properties, where the body begins.
 
 use super::scalar::Scalar;
 use crate::codec::import::error::ImportError;
@@ -77,7 +78,7 @@ impl Comments {
         let Some(value) = self.value(key) else { return Ok(None) };
         match value.parse::<f32>() {
             Ok(number) if number.is_finite() => Ok(Some(number)),
-            _ => Err(ImportError::damaged(format!("its comment {key} has \"{}\", no number", value.escape_debug()))),
+            _ => Err(ImportError::damaged(format!("its comment {key} has \"{}\", not a number", value.escape_debug()))),
         }
     }
 }
@@ -144,7 +145,7 @@ impl Header {
 }
 
 impl Element {
-    /// Returns the number of bytes of a row in a binary body; `None` if rows differ, since one of the properties is a list.
+    /// Returns the number of bytes of a row in a binary body; `None` if rows differ, since a property is a list.
     pub(super) fn stride(&self) -> Option<usize> {
         self.properties.iter().try_fold(0, |sum: usize, property| match property.kind {
             Kind::One(scalar) => sum.checked_add(scalar.size()),

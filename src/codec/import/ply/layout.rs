@@ -1,6 +1,6 @@
 //! The layout of a PLY file: what its properties mean.
 //!
-//! In: the names of the elements and their properties. Out: a [`Layout`], or an error that says what the file is instead.
+//! In: the names of the elements and their properties. Out: a [`Layout`], or an error that names the kind of file.
 
 use super::table::Table;
 use crate::codec::import::error::ImportError;

@@ -1,8 +1,9 @@
 //! PLY files of Gaussians.
 //!
-//! In: the bytes of a file. Out: its scene. `header` and `body` read PLY as such, into a [`Table`] for each element; `layout` recognizes the trainer or
-//! tool by the names of the properties; `splats`, `compressed`, `moving`, `spacetime` and `rotated` read one layout each, or some that differ in names alone.
-//! `deltas` adds frames of motion, `origin` and `axes` find where the places of a file are, `unread` names what is not read.
+//! In: the bytes of a file. Out: its scene. `header` and `body` read PLY as such, into a [`Table`] for each element;
+//! `layout` recognizes the trainer or tool by the names of the properties; `splats`, `compressed`, `moving`,
+//! `spacetime` and `rotated` read one layout each, or several that differ only in names. `deltas` adds frames of
+//! motion, `origin` finds the origin of far places, `axes` the axis that points up, `unread` names unread properties.
 
 pub(crate) mod axes;
 mod body;

@@ -1,7 +1,7 @@
 //! Layouts of Gaussians that move along straight lines and have a lifespan each.
 //!
-//! In: the table of a file of `FreeTimeGS`, or of the sources of `.sogst` and `.sog4d`, and its comments. Out: motion for
-//! [`Columns`](crate::codec::import::columns::Columns), and how it is played.
+//! In: the table of a file of `FreeTimeGS`, or of the sources of `.sogst` and `.sog4d`, and its comments. Out: motion
+//! for [`Columns`](crate::codec::import::columns::Columns), and how it is played.
 
 use super::header::Comments;
 use super::splats::rows;

@@ -1,7 +1,7 @@
-//! Places that are far from 0, as coordinates of maps are: single precision has too few digits for them.
+//! Places far from 0, such as map coordinates, for which single precision has too few digits.
 //!
-//! In: the places of the Gaussians of a file in double precision, and their scales. Out: the origin that means are relative to, 0 unless the places
-//! are far; sentences about it, and about digits that single precision does not have.
+//! In: the places of the Gaussians of a file in double precision, and their scales. Out: the origin that means are
+//! relative to, 0 unless the places are far; sentences about it, and about digits that single precision does not have.
 
 use super::header::Comments;
 use super::table::Column;
@@ -51,7 +51,8 @@ pub(super) fn place(columns: &[Column<'_>; 3], row: usize) -> [f64; 3] {
 }
 
 impl Places<'_> {
-    /// Returns the origin of the places: that which is given, else the center in whole units if it is far, else 0. Sentences are added to `lost`.
+    /// Returns the origin of the places: that which is given, else the center in whole units if it is far, else 0.
+    /// Sentences are added to `lost`.
     pub(super) fn origin(&self, log_scale: &[[f32; 3]], given: Option<[f64; 3]>, lost: &mut Vec<String>) -> [f64; 3] {
         let Some(middle) = Middle::of(self, log_scale) else { return given.unwrap_or_default() };
         let origin = given.unwrap_or_else(|| middle.origin());
@@ -104,7 +105,7 @@ impl Middle {
         if is_far { self.center.map(|value| value.round() + 0.0) } else { [0.0; 3] }
     }
 
-    /// Returns what is to be said about places with this origin.
+    /// Returns the sentence about places with this origin; `None` if they are near 0 and lose no digits.
     fn sentence(&self, origin: [f64; 3], is_double: bool) -> Option<String> {
         let farthest = self.farthest() as f32;
         let step = f64::from(farthest.next_up()) - f64::from(farthest);
@@ -123,7 +124,7 @@ impl Middle {
     }
 }
 
-/// Returns the value below which a part of the values are; 0 without values.
+/// Returns a quantile of the values, `part` from 0 to 1; 0 without values.
 fn quantile(values: impl Iterator<Item = f64>, part: f64) -> f64 {
     let mut values: Vec<f64> = values.collect();
     let index = (values.len().saturating_sub(1) as f64 * part) as usize;

@@ -35,10 +35,9 @@ pub(crate) fn read(source: &Source<'_>, options: &ReadOptions) -> Result<Importe
     lost.extend(unread::sentences(layout, &header.elements));
     let (motion, played) = match layout {
         Layout::FreeTime => moving::free_time(vertex, comments, options, &mut lost)?,
-        Layout::Sogst => moving::sogst(vertex, comments, options, &mut lost)?,
+        Layout::Sogst | Layout::SogstCurved => moving::sogst(vertex, comments, options, &mut lost)?,
         Layout::Sog4d => moving::sog4d(vertex, comments)?,
         Layout::Splats | Layout::Compressed | Layout::Rotated => (Vec::new(), Played::still(UpAxis::NegY)),
-        Layout::SogstCurved => moving::sogst(vertex, comments, options, &mut lost)?,
         Layout::Spacetime => spacetime::lifespans(vertex, options, &mut lost)?,
     };
     let played = Played { up: axes::up(comments).unwrap_or(played.up), ..played };
@@ -57,7 +56,8 @@ pub(crate) fn read(source: &Source<'_>, options: &ReadOptions) -> Result<Importe
     Ok(Imported { scene: columns.into_scene(played, options)?, lost })
 }
 
-/// Reads the Gaussians of a file that are all at rest, relative to the origin that is given. Returns the axis that points up, too, if the file says it.
+/// Reads a file whose Gaussians are all at rest, with means relative to the given origin. Also returns the axis that
+/// points up, if the file states it.
 ///
 /// # Errors
 /// As [`read`]; a file of moving Gaussians.
@@ -95,7 +95,7 @@ fn vertex<'a, 'b>(tables: &'b [Table<'a>]) -> Result<&'b Table<'a>, ImportError>
     tables.iter().find(|table| table.name == "vertex").ok_or_else(|| ImportError::damaged("has no element vertex"))
 }
 
-/// Reads the attributes that Gaussians at rest have too.
+/// Reads the attributes of Gaussians at rest, which moving ones have too.
 fn at_rest(
     layout: Layout,
     tables: &[Table<'_>],

@@ -11,11 +11,11 @@ use crate::gaussian::{Harmonics, Parameters};
 use crate::scene::Trained;
 use rayon::prelude::*;
 
-/// The smallest scale that has a logarithm here.
+/// Scales are raised to this one: the logarithm of 0 is not finite.
 const SMALLEST: f32 = 1e-12;
 
-/// Reads native 4D Gaussians. Returns the origin of their means, too, which is given or follows from their places; sentences about it are added to
-/// `lost`.
+/// Reads native 4D Gaussians. Also returns the origin of their means, which is given or follows from their places;
+/// sentences about it are added to `lost`.
 ///
 /// # Errors
 /// A property that is missing; coefficients of no known degree.

@@ -1,4 +1,5 @@
-//! Layouts of Gaussians on curved paths: Spacetime Gaussians without a decoder ("lite"), and the interchange PLY of `.sogst` with an acceleration.
+//! Layouts of Gaussians on curved paths: Spacetime Gaussians without a decoder ("lite"), and the interchange PLY of
+//! `.sogst` with an acceleration.
 //!
 //! In: the table of a file. Out: lifespans, and the [`Bend`]s of the paths.
 

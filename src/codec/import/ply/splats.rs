@@ -1,6 +1,7 @@
 //! The properties of 3DGS, which most layouts have.
 //!
-//! In: a table with means, scales, rotations, opacities and colors by the names of the original trainer. Out: [`Columns`] of Gaussians at rest.
+//! In: a table with means, scales, rotations, opacities and colors by the names of the original trainer. Out:
+//! [`Columns`] of Gaussians at rest.
 
 use super::header::Comments;
 use super::origin::{Places, place};
@@ -10,12 +11,12 @@ use crate::codec::import::error::ImportError;
 use crate::gaussian::Harmonics;
 use rayon::prelude::*;
 
-/// Fewest rows that are worth a thread.
+/// Fewest rows of a thread.
 const ROWS: usize = 4096;
 /// The properties of colors without coefficients.
 pub(super) const PLAIN: [&str; 3] = ["red", "green", "blue"];
 
-/// Reads Gaussians at rest, with the origin that is given or follows from their places; sentences about what is not read are added to `lost`.
+/// Reads Gaussians at rest, with the origin that is given or follows from their places. Sentences are added to `lost`.
 ///
 /// # Errors
 /// A property that is missing; coefficients of no known degree.
@@ -91,7 +92,8 @@ fn plain_colors(table: &Table<'_>) -> Result<Harmonics, ImportError> {
     Ok(Harmonics { coefficients: 1, degree: 0, degree_t: 0, values: rgb.into_flattened() })
 }
 
-/// Returns the coefficients above degree 0 that a file with this number of `f_rest` properties has for each channel, and the degree that is read.
+/// Returns the coefficients above degree 0 that a file with this number of `f_rest` properties has for each channel,
+/// and the degree that is read.
 pub(super) fn degree(rest: usize) -> Result<(usize, u32), ImportError> {
     match rest {
         0 => Ok((0, 0)),
@@ -105,7 +107,7 @@ pub(super) fn degree(rest: usize) -> Result<(usize, u32), ImportError> {
     }
 }
 
-/// Adds the variance of the filter of Mip-Splatting to the Gaussians, whose opacity decreases as their volume grows.
+/// Adds the variance of the 3D filter of Mip-Splatting; opacities decrease by the ratio of the volumes.
 fn fuse(columns: &mut Columns, filter: Column<'_>) {
     let all = columns.log_scale.par_iter_mut().zip(&mut columns.opacity_logit).enumerate();
     all.for_each(|(index, (log_scale, opacity_logit))| {
@@ -124,12 +126,12 @@ fn fuse(columns: &mut Columns, filter: Column<'_>) {
     });
 }
 
-/// Returns whether the header says that the Gaussians were trained with the screen-space filter of Mip-Splatting; the last comment decides.
+/// Returns whether the header states training with the screen-space filter of Mip-Splatting; the last comment decides.
 fn is_antialiased(comments: &Comments) -> bool {
-    let says = |comment: &String| {
+    let states = |comment: &String| {
         let one = Comments(vec![comment.clone()]);
         let mode = one.value("SplatRenderMode").map(|mode| mode.eq_ignore_ascii_case("mip"));
         mode.or_else(|| one.value("antialiased").map(|flag| flag == "1" || flag.eq_ignore_ascii_case("true")))
     };
-    comments.0.iter().rev().find_map(says).unwrap_or(false)
+    comments.0.iter().rev().find_map(states).unwrap_or(false)
 }

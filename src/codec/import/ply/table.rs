@@ -6,16 +6,14 @@ use super::scalar::Scalar;
 use crate::codec::import::error::ImportError;
 use std::borrow::Cow;
 
-/// A table. Its bytes have every row.
+/// A table, whose `bytes` have every row.
 #[derive(Debug, Clone)]
 pub(crate) struct Table<'a> {
-    /// The name of the element.
     pub(super) name: String,
     /// Number of rows.
     pub(super) count: usize,
     /// Number of bytes of a row.
     pub(super) stride: usize,
-    /// The rows.
     pub(super) bytes: Cow<'a, [u8]>,
     /// Whether its numbers are big-endian.
     pub(super) is_big: bool,
@@ -117,7 +115,7 @@ impl Column<'_> {
         self.scalar == Scalar::F64
     }
 
-    /// Returns the largest value that an integer of the file stands for; `None` if its values are not bytes or words of 16 bits.
+    /// Returns the largest value of the integers of the file; `None` if they are not bytes or words of 16 bits.
     pub(super) fn largest(&self) -> Option<f64> {
         match self.scalar {
             Scalar::U8 => Some(255.0),
@@ -126,7 +124,8 @@ impl Column<'_> {
         }
     }
 
-    /// Returns the value of a row as a share: of 255 if it is a byte, of 65 535 if it has 16 bits, else the value itself; 0 beyond the last.
+    /// Returns the value of a row as a share of 255 for a byte, of 65 535 for 16 bits, else as stored; 0 beyond the
+    /// last.
     pub(crate) fn share(&self, row: usize) -> f32 {
         self.f32(row) / self.largest().unwrap_or(1.0) as f32
     }

@@ -27,7 +27,7 @@ fn sliced(imported: Imported) -> (Vec<Gaussian>, Harmonics) {
 }
 
 #[test]
-fn values_of_3dgs_stay_as_they_are() {
+fn values_of_3dgs_are_read_unchanged() {
     for (rest, degree) in [(0, 0), (9, 1), (24, 2), (45, 3)] {
         let file = File::splats(5, rest);
         let imported = read(&file.little());
@@ -132,7 +132,7 @@ fn colors_without_coefficients_are_of_degree_0() {
 }
 
 #[test]
-fn comments_say_which_axis_points_up() {
+fn comments_state_the_axis_that_points_up() {
     let up = |comments: &[&str]| {
         let comments = comments.iter().map(|comment| (*comment).to_owned()).collect();
         read(&File { comments, ..File::splats(1, 0) }.little()).scene.playback.up
@@ -152,7 +152,7 @@ fn comments_say_which_axis_points_up() {
     assert_eq!(read(&moving.little()).scene.playback.up, UpAxis::PosZ, "of moving Gaussians, too");
     let options = ReadOptions { up: Some(UpAxis::NegX), ..ReadOptions::default() };
     let found = read_bytes(&moving.little(), &options).expect("it can be read");
-    assert_eq!(found.scene.playback.up, UpAxis::NegX, "an option is stronger");
+    assert_eq!(found.scene.playback.up, UpAxis::NegX, "an option overrides the comment");
 }
 
 #[test]
@@ -466,7 +466,7 @@ fn animated(file: &File, names: &[&str], frames: &[([f32; 2], Vec<Vec<u8>>)]) ->
 }
 
 #[test]
-fn frames_of_motion_play() {
+fn frames_of_motion_are_read_as_moving_pieces() {
     let file = File::splats(2, 0).comment("Exported from Brush").comment("Vertical axis: y");
     let still = vec![127, 127, 127];
     let range = [-0.3, 0.3];
@@ -495,7 +495,7 @@ fn frames_of_motion_play() {
     }
     let assumed = read(&bytes);
     assert_eq!(assumed.scene.playback.duration_seconds, 2.0 / 30.0, "30 frames a second");
-    assert!(assumed.lost[0].contains("3 frames are played at 30 a second"), "which is said: {:?}", assumed.lost);
+    assert!(assumed.lost[0].contains("3 frames are played at 30 a second"), "it is stated: {:?}", assumed.lost);
 }
 
 #[test]
@@ -505,7 +505,7 @@ fn frames_of_motion_change_rotations_and_scales() {
     let last = [254, 127, 0, 127, 254, 0, 127];
     let frames = [([-1.0, 1.0], vec![vec![127; 7]]), ([-1.0, 1.0], vec![last.to_vec()])];
     let imported = read(&animated(&file, &names, &frames));
-    assert!(imported.lost.iter().any(|lost| lost.contains("rotation and the scales")), "said: {:?}", imported.lost);
+    assert!(imported.lost.iter().any(|lost| lost.contains("rotation and the scales")), "stated: {:?}", imported.lost);
     let found = sliced(imported).0[0];
     let mut middle = file;
     for (name, part) in names.iter().zip(last) {
@@ -553,7 +553,7 @@ const MAP: [[f64; 3]; 3] =
     [[500_001.05, 5_400_000.5, 310.4], [499_999.25, 5_400_000.7, 309.4], [500_000.45, 5_400_001.1, 309.8]];
 const MIDDLE: [f64; 3] = [500_000.0, 5_400_001.0, 310.0];
 
-/// Reads a file, and returns the origin, the means, and what is said.
+/// Reads a file, and returns the origin, the means, and the sentences.
 fn origin(text: &str) -> ([f64; 3], Vec<[f32; 3]>, Vec<String>) {
     let imported = read(text.as_bytes());
     let (place, lost) = (imported.scene.trained_with.origin.place, imported.lost.clone());
@@ -569,24 +569,24 @@ fn places_on_a_map_are_relative_to_their_middle() {
         assert_eq!(*mean, expected, "no digit of {place:?} is lost");
     }
     assert_eq!(lost.len(), 1, "one sentence: {lost:?}");
-    let is_said = lost[0].contains("(500000, 5400001, 310)") && lost[0].contains("0.5 units");
-    assert!(is_said, "the origin, and the step of single precision: {lost:?}");
+    let is_stated = lost[0].contains("(500000, 5400001, 310)") && lost[0].contains("0.5 units");
+    assert!(is_stated, "the origin, and the step of single precision: {lost:?}");
 
     let (place, means, lost) = origin(&placed("float", &MAP));
     assert_eq!(place, MIDDLE, "of single precision, too");
     let expected: [f32; 3] = std::array::from_fn(|axis| (f64::from(MAP[2][axis] as f32) - MIDDLE[axis]) as f32);
     assert_eq!(means[2], expected, "the digits that the file has");
-    assert!(lost[0].contains("Digits were lost") && lost[0].contains("0.5 units"), "which is said: {lost:?}");
+    assert!(lost[0].contains("Digits were lost") && lost[0].contains("0.5 units"), "it is stated: {lost:?}");
 }
 
 #[test]
 fn places_near_zero_have_no_origin() {
     let near = [[500.0, 0.25, 0.0], [501.0, 1.0, 0.5], [499.0, -1.0, 1.5]];
     let (place, means, lost) = origin(&placed("double", &near));
-    assert_eq!((place, lost), ([0.0; 3], Vec::new()), "370 times as far as large");
+    assert_eq!((place, lost), ([0.0; 3], Vec::new()), "370 times the radius from 0");
     assert_eq!(means, near.map(|place| place.map(|value| value as f32)), "the places as they are");
     let farther = near.map(|[x, y, z]| [x + 1500.0, y, z]);
-    assert_eq!(origin(&placed("double", &farther)).0, [2000.0, 0.0, 1.0], "1500 times as far as large");
+    assert_eq!(origin(&placed("double", &farther)).0, [2000.0, 0.0, 1.0], "1500 times the radius from 0");
     let around = |center: f64, other: f64| {
         let mut places: Vec<[f64; 3]> = (0..30).map(|index| [center, f64::from(index) * 0.1, 0.0]).collect();
         places.push([other, 0.0, 0.0]);
@@ -597,11 +597,11 @@ fn places_near_zero_have_no_origin() {
     let wide: Vec<[f64; 3]> = (0..30).map(|index| [1e7, f64::from(index) * 1e4, 0.0]).collect();
     let (place, _, lost) = origin(&placed("double", &wide));
     assert_eq!(place, [0.0; 3], "a scene of 290,000 units");
-    assert!(lost[0].contains("steps of 1 units at 10000000"), "digits that are rounded are said: {lost:?}");
+    assert!(lost[0].contains("steps of 1 units at 10000000"), "rounded digits are stated: {lost:?}");
 }
 
 #[test]
-fn a_comment_says_the_origin() {
+fn a_comment_states_the_origin() {
     let text = placed("double", &MAP).replace("element", "comment gs4d.origin 499999 5400000 0.5\nelement");
     let (place, means, _) = origin(&text);
     assert_eq!(place, [499_999.0, 5_400_000.0, 0.5], "the origin of the comment");

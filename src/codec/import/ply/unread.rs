@@ -1,6 +1,6 @@
-//! What a PLY file has beside the elements and properties of its layout.
+//! The elements and properties of a PLY file that are not read.
 //!
-//! In: the layout and the elements of a header. Out: sentences with the names of those that are not read.
+//! In: the layout and the elements of a header. Out: sentences with their names.
 
 use super::deltas;
 use super::header::Element;

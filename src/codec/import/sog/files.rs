@@ -1,7 +1,7 @@
 //! The files of a capture of the SOG family.
 //!
-//! In: a zip archive in memory, or the files beside a file. Out: the bytes of a file by its name. What the entries of an archive unpack to is limited by
-//! its [`Budget`].
+//! In: a zip archive in memory, or the files beside a file. Out: the bytes of a file by its name. The unpacked size of
+//! the entries is limited by the [`Budget`] of the archive.
 
 use crate::codec::budget::Budget;
 use crate::codec::import::ImportError;

@@ -32,7 +32,7 @@ pub(super) struct Images {
     pub rest: Option<Palette>,
 }
 
-/// Three numbers of 16 bits for each Gaussian, linear between the limits: the low bytes in the first texture, the high bytes in the second.
+/// Three 16-bit numbers for each Gaussian, linear between limits: low bytes in the first texture, high in the second.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub(super) struct Wide {
     pub mins: [f64; 3],

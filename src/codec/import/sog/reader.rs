@@ -13,7 +13,7 @@ use crate::codec::start::{Start, ZIP};
 /// Extensions of its archives, without the dot.
 pub(crate) const EXTENSIONS: &[&str] = &["sog", "sogst", "sog4d", "tsog"];
 
-/// Names of the file of a folder that says how to read the others.
+/// Names of the file of a folder that describes the others.
 const MAIN: [&str; 2] = ["lod-meta.json", META];
 /// Its name in an archive.
 const META: &str = "meta.json";
@@ -28,7 +28,7 @@ pub(crate) fn is_of(start: &Start) -> bool {
     start.is_object() && (is_named || has_means || start.mentions("\"lodLevels\""))
 }
 
-/// Returns the name of the file that says how to read the others of a folder; `None` if the folder has no such file.
+/// Returns the name of the file that describes the others of a folder; `None` if the folder has no such file.
 pub(crate) fn main_file(folder: &Start) -> Option<&'static str> {
     MAIN.into_iter().find(|name| folder.has_entry(name))
 }

@@ -1,6 +1,7 @@
 //! `.sog4d` of SuperSplat's 4D branch, version 1: SOG with linear motion and radial basis functions of time.
 //!
-//! In: `meta.json` and its textures. Out: a moving scene, y down, in absolute seconds. Its segments are an index that is not needed here.
+//! In: `meta.json` and its textures. Out: a moving scene, y down, in absolute seconds. Segments, an index, are not
+//! read.
 
 use super::files::Files;
 use super::meta::{self, Images, Wide};

@@ -1,7 +1,7 @@
 //! `.sogst` of Solipsist Studios, version 1: SOG with motion and lifespans in seconds.
 //!
-//! In: `meta.json` and its textures, of all Gaussians or of each group of a stream. Out: a moving scene, y down. Its segments are an index for
-//! players and are not needed here; paths of degree 2 become straight pieces.
+//! In: `meta.json` and its textures, of all Gaussians or of each group of a stream. Out: a moving scene, y down. Its
+//! segments are an index for players and are not needed here; paths of degree 2 become straight pieces.
 
 use super::files::Files;
 use super::meta::{self, Images, Wide};

@@ -1,7 +1,7 @@
 //! The attributes that all formats of the SOG family have, from textures to columns.
 //!
-//! In: the names of the textures and the meaning of their codes, the textures. Out: [`Columns`] of Gaussians at rest; those whose opacity is 0 are
-//! left out, since writers do not keep their colors.
+//! In: the names of the textures and the meaning of their codes, the textures. Out: [`Columns`] of Gaussians at rest;
+//! those whose opacity is 0 are left out, since writers do not keep their colors.
 
 use super::files::Files;
 use super::meta::{Coded, Images, Palette, Wide};
@@ -112,7 +112,7 @@ impl Wide {
         })
     }
 
-    /// Returns the three numbers of which two texels have the signed logarithms.
+    /// Returns the three numbers whose signed logarithms are in two texels.
     pub(super) fn signed_log(&self, low: [u8; 4], high: [u8; 4]) -> [f32; 3] {
         self.linear(low, high).map(|log| log.abs().exp_m1().copysign(log) as f32)
     }
@@ -139,7 +139,7 @@ impl Layout {
         Ok(Self { means, scales, scale, rotations, colors, color, opacity, rest: rest.transpose()? })
     }
 
-    /// Returns the names of the textures with a texel for each Gaussian, in the order that [`columns`](Self::columns) expects.
+    /// Returns the names of the textures with a texel for each Gaussian, in the order of [`columns`](Self::columns).
     pub(super) fn names(&self) -> impl Iterator<Item = &str> {
         let [low, high] = &self.means.files;
         let labels = self.rest.as_ref().map(|rest| &rest.labels);
@@ -180,7 +180,7 @@ impl Layout {
     /// Returns the columns of the Gaussians `kept`, from the textures of all of them.
     ///
     /// # Errors
-    /// A code without a value, a label without a centroid, a rotation that is none.
+    /// A code without a value, a label without a centroid, a texel that is no rotation.
     pub(super) fn columns(
         &self,
         textures: &[Texture],
@@ -251,7 +251,7 @@ fn three(tables: &[Table; 3], texel: [u8; 4]) -> [f32; 3] {
     std::array::from_fn(|channel| tables[channel].at(texel[channel]))
 }
 
-/// Returns the quaternion w, x, y, z of a texel, which has the components but the largest one.
+/// Returns the quaternion w, x, y, z of a texel, which has all components but the largest.
 fn rotation([red, green, blue, largest]: [u8; 4]) -> Option<[f32; 4]> {
     let [a, b, c] = [red, green, blue].map(|code| (f64::from(code) / 255.0 - 0.5) * SQRT_2);
     let d = (1.0 - a * a - b * b - c * c).max(0.0).sqrt();
@@ -290,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn rotations_have_their_largest_component_where_alpha_says() {
+    fn alpha_states_the_largest_component_of_a_rotation() {
         for largest in 0..4 {
             let found = rotation([128, 128, 128, FIRST_LEFT_OUT + largest]).expect("a rotation");
             for (axis, component) in found.into_iter().enumerate() {

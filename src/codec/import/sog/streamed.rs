@@ -66,7 +66,7 @@ pub(super) fn read(beside: &dyn Beside, meta: &Value, options: &ReadOptions) -> 
             Ok((mut columns, mut lost)) => {
                 if !missing.is_empty() {
                     lost.push(format!(
-                        "This is level {level} of its levels of detail, with {} Gaussians: files of the finer levels are not there ({}).",
+                        "This is level {level} of its levels of detail, with {} Gaussians: files of the finer levels are missing ({}).",
                         columns.len(),
                         missing.join("; ")
                     ));
@@ -84,13 +84,13 @@ pub(super) fn read(beside: &dyn Beside, meta: &Value, options: &ReadOptions) -> 
         }
     }
     Err(ImportError::damaged(format!(
-        "of none of its levels of detail all files are there ({}); copy the whole folder",
+        "none of its levels of detail has all of its files ({}); copy the whole folder",
         missing.join("; ")
     )))
 }
 
 impl Fields {
-    /// Returns the ranges of each file with Gaussians of a level. Parts of space without it have their next coarser one.
+    /// Returns the ranges of each file with Gaussians of a level; parts of space without it have the next coarser one.
     ///
     /// # Errors
     /// A file that the list does not have; ranges that overlap.

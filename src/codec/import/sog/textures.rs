@@ -1,7 +1,8 @@
 //! Textures: lossless WebP pictures whose texels are numbers.
 //!
-//! In: the bytes of WebP files. Out: their texels, red, green, blue and alpha, row by row, with the bytes as stored. The size of a texture is
-//! compared with the number of Gaussians before it is decoded, and the number of Gaussians with the [`Budget`] of all textures.
+//! In: the bytes of WebP files. Out: their texels, red, green, blue and alpha, row by row, with the bytes as stored.
+//! The size of a texture is compared with the number of Gaussians before it is decoded, and the number of Gaussians
+//! with the [`Budget`] of all textures.
 
 use super::files::Files;
 use crate::codec::budget::Budget;
@@ -11,11 +12,11 @@ use image_webp::WebPDecoder;
 use rayon::prelude::*;
 use std::io::Cursor;
 
-/// Texels of a texture for each Gaussian, and of every texture: more than any writer adds at the end of its rows.
+/// Most texels of a texture for each Gaussian, and further ones of every texture: more than the padding of any writer.
 const TEXELS: usize = 4;
-const ALWAYS: usize = 1024;
-/// Bytes of a Gaussian that is made of textures: a texel of each of about ten, its numbers with color of degree 3, and the Gaussian as it is drawn. Its
-/// textures have about ten bytes.
+const PADDING: usize = 1024;
+/// Bytes of memory of a Gaussian: its texels in about ten textures, its values with color of degree 3, and the Gaussian
+/// as it is drawn. In the file it has about ten bytes.
 const GAUSSIAN: u64 = 440;
 
 /// The texels of a texture.
@@ -47,7 +48,7 @@ impl Encoded {
     /// # Errors
     /// A size that does not fit the count; a picture that is damaged or not lossless WebP.
     pub(super) fn decode(&self, count: usize) -> Result<Texture, ImportError> {
-        let most = count.saturating_mul(TEXELS).saturating_add(ALWAYS);
+        let most = count.saturating_mul(TEXELS).saturating_add(PADDING);
         let mut texture = self.decode_if(|width, height| {
             let fits = width.checked_mul(height).is_some_and(|texels| (count..=most).contains(&texels));
             fits.then_some(()).ok_or_else(|| format!("does not fit {count} Gaussians"))

@@ -1,6 +1,6 @@
 //! TSOG of version 4, with or without the playback profile of OpsiClear: SOG with a timeline.
 //!
-//! In: `meta.json` and its textures. Out: a scene, y up: frames as a temporal filter, or motion and lifespans in parts of the clip.
+//! In: `meta.json` and its textures. Out: a scene, y up: frames as a temporal filter, or motion and lifespans.
 
 use super::files::Files;
 use super::meta::{self, Images, Wide};
@@ -55,7 +55,7 @@ struct Timeline {
     files: [String; 2],
 }
 
-/// Attributes that change. Another one than the mean would be another capture without it.
+/// Attributes that change over time. All but the mean are refused: the capture would look different without them.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Temporal {
@@ -153,7 +153,7 @@ pub(super) fn read(files: &mut Files, meta: &Value, options: &ReadOptions) -> Re
         ));
     }
     if let Some(rate) = fields.playback.rate.filter(|&rate| rate != 1.0) {
-        lost.push(format!("It asks to be played at {rate} times its speed: set the speed of the playback."));
+        lost.push(format!("It is meant to be played at {rate} times its speed: set the speed of the playback."));
     }
     let played = Played { duration_seconds: duration(&fields, &moving, options)?, ..Played::still(UpAxis::PosY) };
     Ok(Imported { scene: columns.into_scene(played, options)?, lost })
@@ -229,7 +229,7 @@ fn windows(frames: u32, codes: u32, low: &Texture, high: &Texture, kept: &[u32])
     }
 }
 
-/// Returns the seconds of the clip: those of the options, else those that the file states or that follow from its frames.
+/// Returns the seconds of the clip: of the options, else of the file, stated or from its number of frames.
 ///
 /// # Errors
 /// A duration or frames a second that are not positive.

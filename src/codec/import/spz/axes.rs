@@ -1,14 +1,14 @@
 //! The coordinate system of an SPZ file.
 //!
-//! In: the number in the extension record of Adobe. Out: the matrix from the axes of the file to right, up, back, the axes of SPZ files without this
-//! record. Half of the systems are mirrored.
+//! In: the number in the extension record of Adobe. Out: the matrix from the axes of the file to right, up, back, the
+//! axes of SPZ files without this record. Half of the systems are mirrored.
 
 use glam::{DMat3, DVec3};
 
 /// Returns the matrix of a coordinate system; `None` of a number that is none.
 ///
-/// 1 to 8 are LDB, RDB, LUB, RUB, LDF, RDF, LUF, RUF: x left or right, y down or up, z back or front. 9 to 16 are LFD, RFD, LFU, RFU, LBD, RBD, LBU,
-/// RBU: y front or back, z down or up. 0 is the same as 4.
+/// 1 to 8 are LDB, RDB, LUB, RUB, LDF, RDF, LUF, RUF: x left or right, y down or up, z back or front. 9 to 16 are LFD,
+/// RFD, LFU, RFU, LBD, RBD, LBU, RBU: y front or back, z down or up. 0 is the same as 4.
 pub(super) fn to_right_up_back(system: u32) -> Option<DMat3> {
     let index = match system {
         0 => 3,

@@ -1,7 +1,7 @@
 //! SPZ files, versions 2 to 4.
 //!
-//! In: the bytes of a file, or of a buffer of a glTF file. Out: a scene, or Gaussians in columns. `payload` reads the container, `axes` the coordinate
-//! system, `read` decodes the columns.
+//! In: the bytes of a file, or of a buffer of a glTF file. Out: a scene, or Gaussians in columns. `payload` reads the
+//! container, `axes` the coordinate system, `read` decodes the columns.
 
 mod axes;
 mod payload;

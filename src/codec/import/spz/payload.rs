@@ -1,7 +1,8 @@
 //! The container of an SPZ file.
 //!
-//! In: the bytes of a file. Out: [`Payload`]: what the header says, and the six columns, decompressed. Versions 2 and 3 are one stream of gzip, version 4
-//! is a header and one zstd frame for each column. A header may promise only as much as its file can hold.
+//! In: the bytes of a file. Out: [`Payload`]: the values of the header, and the six columns, decompressed. Versions 2
+//! and 3 are one stream of gzip, version 4 is a header and one zstd frame for each column. Its numbers are checked
+//! against the file size.
 
 use crate::codec::budget::Budget;
 use crate::codec::import::error::ImportError;
@@ -19,9 +20,9 @@ const GZIP: &[u8] = &[0x1f, 0x8b];
 const HEADER: usize = 16;
 /// Bytes of the header of version 4.
 const HEADER_4: usize = 32;
-/// Bytes of a Gaussian that is made of the columns, as it is read and as it is drawn, without its coefficients.
+/// Bytes of memory of a Gaussian, as it is read and as it is drawn, without its coefficients.
 const GAUSSIAN: u64 = 160;
-/// Bytes of its coefficients of one degree and order.
+/// Bytes of memory of one coefficient of three channels.
 const COEFFICIENT: u64 = 12;
 /// Most bytes of extension records behind the columns.
 const EXTENSIONS: u64 = 64 << 10;
@@ -44,7 +45,7 @@ pub(super) struct Payload {
     pub count: usize,
     /// Degree of the colors, 0 to 4.
     pub degree: usize,
-    /// Binary digits behind the point of positions.
+    /// Fractional bits of positions.
     pub fractional_bits: u8,
     /// Whether it was trained with anti-aliasing.
     pub is_antialiased: bool,
@@ -128,18 +129,12 @@ fn width(column: Column, (version, degree): (u32, usize)) -> usize {
         Column::Positions => 9,
         Column::Alphas => 1,
         Column::Colors | Column::Scales => 3,
-        Column::Rotations => {
-            if version < 3 {
-                3
-            } else {
-                4
-            }
-        }
+        Column::Rotations if version < 3 => 3,
+        Column::Rotations => 4,
         Column::Harmonics => COEFFICIENTS[degree] * 3,
     }
 }
 
-/// The header.
 struct Header {
     version: u32,
     count: usize,
@@ -167,7 +162,9 @@ impl Header {
             return Err(ImportError::damaged(format!("colors of degree {degree}, of which 0 to 4 exist")));
         }
         if fractional_bits > 24 {
-            return Err(ImportError::damaged(format!("{fractional_bits} binary digits behind the point, of 24")));
+            return Err(ImportError::damaged(format!(
+                "positions have {fractional_bits} fractional bits, of at most 24"
+            )));
         }
         Ok(Self { version, count: count as usize, degree: usize::from(degree), fractional_bits, flags })
     }

@@ -1,6 +1,6 @@
 //! The Gaussians of an SPZ file.
 //!
-//! In: the [`Payload`] of a file. Out: [`Columns`], right, up, back; of a whole file a scene, and what it does not show.
+//! In: the [`Payload`] of a file. Out: [`Columns`], right, up, back; of a file a scene, and what it does not show.
 
 use super::axes::to_right_up_back;
 use super::payload::{Column, Payload};
@@ -95,8 +95,8 @@ fn three_components(bytes: &[u8]) -> [f32; 4] {
     [w, x, y, z]
 }
 
-/// Returns the rotation w, x, y, z of the smallest three of x, y, z, w: the index of the largest in two bits, then a sign and nine bits for each of the
-/// others.
+/// Returns the rotation w, x, y, z of the smallest three of x, y, z, w: the index of the largest in two bits, then a
+/// sign and nine bits for each of the others.
 fn smallest_three(bytes: &[u8]) -> [f32; 4] {
     let mut word = u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
     let largest = (word >> 30) as usize;
@@ -202,7 +202,7 @@ mod tests {
                 }
                 let [w, x, y, z] = columns.rotation[0];
                 assert!((w * w + x * x + y * y + z * z - 1.0).abs() < 0.01, "a rotation of length 1");
-                assert!(columns.mip_filter, "the file says that it was trained with the filter of Mip-Splatting");
+                assert!(columns.mip_filter, "the flag of the filter of Mip-Splatting is read");
                 assert!(lost.is_empty(), "nothing is lost: {lost:?}");
             }
         }
@@ -279,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn a_count_that_promises_more_than_there_is_is_refused() {
+    fn a_count_beyond_the_contents_of_the_file_is_refused() {
         for version in 2..=4 {
             for count in [4, 5, 70_000, u32::MAX] {
                 let whole = file(version, 3, 3, None);
@@ -308,7 +308,7 @@ mod tests {
     }
 
     #[test]
-    fn up_is_y_unless_an_option_says_otherwise() {
+    fn up_is_y_unless_an_option_replaces_it() {
         let bytes = file(4, 1, 1, None);
         let beside = InMemory::default();
         let source = Source { bytes: &bytes, beside: &beside };

@@ -23,7 +23,7 @@ impl<'a> Tracks<'a> {
 
 /// Returns the rotation and the translation of a track at a time.
 pub(super) fn pose(track: &ObjectTrack, time: f64) -> (DQuat, DVec3) {
-    // A track without samples moves nothing; a time is finite.
+    // A track without samples has no pose. An error is impossible, since the time is finite.
     match pose_at(track, time) {
         Ok(Some(Pose { rotation, translation })) => (DQuat::from_array(rotation), DVec3::from(translation)),
         Ok(None) | Err(_) => (DQuat::IDENTITY, DVec3::ZERO),

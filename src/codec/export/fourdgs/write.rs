@@ -1,22 +1,22 @@
 //! Writing `.4dgs` files.
 //!
-//! In: moving Gaussians, with the temporal filter of the capture if it has one. Out: the bytes of a file, and a sentence for each thing that it does
-//! not hold or rounds.
+//! In: moving Gaussians, with the temporal filter of the capture if it has one. Out: the bytes of a file, and a
+//! sentence for each thing that it does not hold or rounds.
 //!
-//! The file is put together here, of the records of the crate `fourdgs`: its own writer has three profiles of precision, none of which keeps the
-//! pictures of large splats, and refuses its own rounding at the bounds of a profile.
+//! The file is put together here, of records of the crate `fourdgs`: its own writer has three profiles of precision, of
+//! which none keeps the pictures of large splats, and refuses its own rounding at the bounds of a profile.
 
 use super::chunks::{Chunk, chunks};
 use super::coder::Coder;
 use super::colors::Colors;
 use super::deviation::Deviation;
-use super::exact::{self, LEVEL};
-use super::memory;
 use super::rows::{Row, rows};
 use super::steps::{REACH, Times};
+use crate::codec::export::clip::Clip;
 use crate::codec::export::error::ExportError;
-use crate::codec::export::table::Clip;
 use crate::codec::import::columns::Columns;
+use crate::codec::import::fourdgs::exact::{self, LEVEL};
+use crate::codec::import::fourdgs::memory;
 use crate::scene::UpAxis;
 use fourdgs::codec::DEFLATE;
 use fourdgs::opcode::SH_BAND_STREAM;
@@ -25,7 +25,7 @@ use fourdgs::records::{self, ChunkIndexEntry, CoordinateFrame, Footer, Header, Q
 use fourdgs::serialization::{MAGIC, crc32, put_record};
 use fourdgs::stream::encode_stream;
 
-/// Encodes a file, and returns what of the Gaussians it does not hold.
+/// Encodes a file, and returns a sentence for each thing that it does not hold or rounds.
 ///
 /// # Errors
 /// Gaussians whose active segments are not contiguous; numbers that are not finite.
@@ -54,12 +54,12 @@ struct File<'r> {
 }
 
 impl File<'_> {
-    /// Returns the bytes of the file, and the Gaussian of each place in it.
+    /// Returns the bytes of the file, and the index of the Gaussian at each place in it.
     fn encode(&self, up: UpAxis) -> fourdgs::Result<(Vec<u8>, Vec<usize>)> {
         let mut bytes = self.head(up);
         let (mut index, mut order) = (Vec::new(), Vec::new());
         for chunk in chunks(&self.lives(), &self.bounds()) {
-            let members = self.nearest_beside(&chunk.members);
+            let members = self.in_morton_order(&chunk.members);
             index.push(self.append_chunk(&mut bytes, &chunk, &members)?);
             order.extend(members);
         }
@@ -111,7 +111,7 @@ impl File<'_> {
         [MAGIC.to_vec(), header.encode(&[]), quantization.encode(&[]), windows.encode(), frame(up).encode(&[])].concat()
     }
 
-    /// Writes a chunk with the bands of its colors, and returns where they are.
+    /// Writes a chunk with the bands of its colors, and returns their offsets.
     fn append_chunk(&self, bytes: &mut Vec<u8>, chunk: &Chunk, members: &[usize]) -> fourdgs::Result<ChunkIndexEntry> {
         let Chunk { times: [t0, t1], level, .. } = *chunk;
         let streams = self.coder.streams(members.iter().map(|&index| &self.rows[index]))?;
@@ -133,27 +133,27 @@ impl File<'_> {
 
     /// Returns the record of this program.
     fn exact_record(&self, order: &[usize]) -> fourdgs::Result<Option<Vec<u8>>> {
-        let colors: Vec<i64> = order.iter().flat_map(|&index| self.color_rests(&self.rows[index])).collect();
-        let coefficients = order.iter().flat_map(|&index| self.colors.rests(index));
-        let coefficients: Vec<i64> = coefficients.map(|&rest| i64::from(rest)).collect();
+        let colors: Vec<i64> = order.iter().flat_map(|&index| self.color_residuals(&self.rows[index])).collect();
+        let coefficients = order.iter().flat_map(|&index| self.colors.residuals(index));
+        let coefficients: Vec<i64> = coefficients.map(|&residual| i64::from(residual)).collect();
         exact::record(&colors, &coefficients, self.colors.coefficients * 3)
     }
 
-    /// Returns what the format leaves of the color of degree 0, in multiples of the step of the record.
-    fn color_rests(&self, row: &Row) -> [i64; 3] {
+    /// Returns the residuals of the color of degree 0, in multiples of [`exact::COLOR`].
+    fn color_residuals(&self, row: &Row) -> [i64; 3] {
         let decoded = self.coder.color(row);
         [0, 1, 2]
             .map(|channel| ((row.color[channel] - decoded[channel]) / exact::COLOR).round().clamp(-REACH, REACH) as i64)
     }
 
-    /// Returns the Gaussians of a chunk in an order in which those beside each other are near in space.
-    fn nearest_beside(&self, members: &[usize]) -> Vec<usize> {
+    /// Returns the Gaussians of a chunk in Morton order, in which neighbors are near in space.
+    fn in_morton_order(&self, members: &[usize]) -> Vec<usize> {
         let means: Vec<f32> =
             members.iter().flat_map(|&index| self.rows[index].mean).map(|coordinate| coordinate as f32).collect();
         morton_order(&means, members.len()).into_iter().map(|place| members[place]).collect()
     }
 
-    /// Returns when each Gaussian is visible.
+    /// Returns the first and the last time, in seconds, at which each Gaussian may be visible.
     fn lives(&self) -> Vec<[f64; 2]> {
         self.rows.iter().map(|row| self.coder.life(row)).collect()
     }
@@ -168,7 +168,7 @@ impl File<'_> {
         bounds
     }
 
-    /// Returns what other players do not show.
+    /// Returns a sentence for each thing that other players do not show.
     fn other_players(&self) -> Vec<String> {
         let beyond = |row: &Row| row.color.iter().fold(0.0_f64, |most, &color| most.max(color - 1.0).max(-color));
         let (mut count, mut farthest) = (0, 0.0_f64);
@@ -208,9 +208,9 @@ fn frame(up: UpAxis) -> CoordinateFrame {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::codec::fourdgs::read;
     use crate::codec::import::Imported;
     use crate::codec::import::columns::{Motion, logit};
+    use crate::codec::import::fourdgs::read;
     use crate::codec::import::source::{InMemory, Source};
     use crate::codec::options::ReadOptions;
     use crate::scene::{ActiveSets, FilterKind, Form, SceneForm, Sliced, TemporalFilter};

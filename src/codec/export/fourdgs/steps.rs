@@ -1,16 +1,16 @@
 //! The precision of a `.4dgs` file.
 //!
-//! In: Gaussians. Out: [`Steps`] so fine that no picture shows them. The profiles of the crate are for small files: they round means to a share of
-//! the median scale, so that large opaque splats change their order.
+//! In: Gaussians. Out: [`Steps`] so fine that no picture shows them. The profiles of the crate are for small files:
+//! they round means to a share of the median scale, so that large opaque splats change their order.
 //!
 //! Numbers are stored as multiples of a step with 32 bits. A step is wider only where 32 bits do not reach.
 
 use super::rows::Row;
 use fourdgs::quantization::{Steps, life_class, support_k};
 
-/// Steps of the means across the middle of the capture, in which 98 of 100 are along each axis.
+/// Number of steps of means across the middle of the capture, the range of 98 % of them along each axis.
 const ACROSS: f64 = (1 << 25) as f64;
-/// Steps of time in the duration.
+/// Number of steps of time in the duration.
 const MOMENTS: f64 = (1 << 24) as f64;
 /// The step of logarithms of scales and of deviations: half of it is two millionths of the scale.
 const LOGARITHM: f64 = 1.0 / (1 << 18) as f64;
@@ -20,7 +20,7 @@ const ROTATION: f64 = 1.0 / (1 << 20) as f64;
 const COLOR: f64 = 1.0 / (1 << 16) as f64;
 /// Largest multiple of a step. The difference of two is stored, too.
 pub(super) const REACH: f64 = (1 << 29) as f64;
-/// Steps of time of the shortest lifespan: the format divides the step for shorter ones.
+/// Number of steps of time in the shortest lifespan that is stored: for shorter ones the format divides the step.
 const SHORTEST: f64 = 32.0;
 
 /// The clip that a file holds.
@@ -33,7 +33,7 @@ pub(super) struct Times {
 }
 
 impl Times {
-    /// Returns how many deviations from its temporal mean a Gaussian is drawn.
+    /// Returns the distance from its temporal mean, in standard deviations, up to which a Gaussian is drawn.
     pub(super) fn reach(self) -> f64 {
         support_k(self.cutoff)
     }
@@ -73,7 +73,7 @@ pub(super) fn velocity_class(row: &Row, steps: &Steps, times: Times) -> f64 {
     life_class(sigma_multiple(row, steps), steps.sigma_log, row.never_fades(), closes - opens, times.reach())
 }
 
-/// Returns the step of means, of which few outliers may be far away.
+/// Returns the step of means, which a few outliers do not widen.
 fn place_step(rows: &[Row]) -> f64 {
     let (mut middle, mut whole) = (0.0_f64, 0.0_f64);
     for axis in 0..3 {
@@ -89,7 +89,7 @@ fn place_step(rows: &[Row]) -> f64 {
     if step > 0.0 { step } else { 1.0 / ACROSS }
 }
 
-/// Returns the step of velocities before it is divided: where a Gaussian is visible, its center is within half a step of means.
+/// Returns the undivided step of velocities, whose rounding moves no visible center by more than half a step of means.
 fn velocity_step(rows: &[Row], steps: &Steps, times: Times) -> f64 {
     let (mut step, mut smallest) = (f64::INFINITY, 0.0_f64);
     for row in rows {

@@ -1,6 +1,6 @@
 //! The memory that a `.4dgs` file takes when it is read.
 //!
-//! In: the bytes of a file; the numbers of Gaussians and coefficients of a file that is written. Out: an error, a sentence, or nothing.
+//! In: the bytes of a file; the numbers of Gaussians and coefficients of a written file. Out: an error, or a sentence.
 
 use super::exact::OPCODE;
 use crate::codec::budget::{Budget, OverBudget};
@@ -8,18 +8,19 @@ use fourdgs::opcode::{CHUNK, SH_BAND_STREAM};
 use fourdgs::records::parse_chunk;
 use fourdgs::serialization::{MAGIC, MAX_STREAM_BYTES, Records};
 
-/// Bytes of a Gaussian without view-dependent color: decoded by the crate and put together.
+/// Bytes of a Gaussian without view-dependent color in the crate `fourdgs`: decoded in a chunk and collected.
 const DECODED: u64 = 80 + 96;
-/// Bytes of a Gaussian in the streams of its chunk, while that is decoded, and as it is here.
+/// Bytes of a Gaussian in the streams of its chunk while that is decoded, and in
+/// [`Columns`](crate::codec::import::columns::Columns).
 const OTHERS: u64 = 168 + 140;
 /// Bytes of a value of view-dependent color in the crate.
 const VALUE: u64 = 9;
-/// Bytes of such a value here.
+/// Bytes of such a value in `Columns`.
 const FLOAT: u64 = 4;
 /// Bytes of a Gaussian in the record of this program.
-const RESTS: u64 = 48 * 12;
+const RESIDUALS: u64 = 48 * 12;
 
-/// Checks what the Gaussians of a file take, before any is decoded. What is damaged is left to the reader.
+/// Checks the memory that the Gaussians of a file take, before any is decoded. Damaged records are left to the reader.
 ///
 /// # Errors
 /// More than a file of this length may take.
@@ -41,7 +42,7 @@ pub(super) fn check(file: &[u8]) -> Result<(), OverBudget> {
                 let band = u64::from(record.content.first().copied().unwrap_or_default());
                 budget.take(count * 3 * (2 * band + 1) * (VALUE + FLOAT))?;
             }
-            OPCODE => budget.take(all.saturating_mul(RESTS))?,
+            OPCODE => budget.take(all.saturating_mul(RESIDUALS))?,
             _ => {}
         }
     }
@@ -49,7 +50,7 @@ pub(super) fn check(file: &[u8]) -> Result<(), OverBudget> {
 }
 
 /// Returns the sentence about a file that the crate does not read, since it holds a limited number of bytes.
-pub(super) fn too_large(count: usize, coefficients: usize) -> Option<String> {
+pub(crate) fn too_large(count: usize, coefficients: usize) -> Option<String> {
     let bytes = count as u64 * (DECODED + 3 * coefficients as u64 * VALUE);
     (bytes > MAX_STREAM_BYTES).then(|| {
         let [bytes, limit] = [bytes, MAX_STREAM_BYTES].map(|bytes| bytes >> 20);
@@ -83,8 +84,8 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_is_not_read_again_is_named() {
-        assert_eq!(too_large(900_000, 15), None, "it is read");
-        assert!(too_large(950_000, 15).is_some_and(|sentence| sentence.contains("526 MiB")), "it is not");
+    fn a_file_too_large_for_the_crate_is_stated() {
+        assert_eq!(too_large(900_000, 15), None, "a file within the limit");
+        assert!(too_large(950_000, 15).is_some_and(|sentence| sentence.contains("526 MiB")), "a file beyond the limit");
     }
 }

@@ -1,9 +1,9 @@
 //! Reading `.4dgs` files.
 //!
-//! In: the bytes of a file. Out: [`Imported`]: its Gaussians with their motion, lifespans and windows of time. Tracks of objects become straight
-//! pieces.
+//! In: the bytes of a file. Out: [`Imported`]: its Gaussians with their motion, lifespans and windows of time. Tracks
+//! of objects become straight pieces.
 
-use super::exact::{self, Rests};
+use super::exact::{self, Residuals};
 use super::memory;
 use super::tracks::{Tracks, pose};
 use crate::codec::import::columns::{Columns, Motion, Played, coefficient, logit};
@@ -19,9 +19,9 @@ use fourdgs::quantization::sh_coefficient;
 use fourdgs::{GaussianSet, Scene};
 use glam::{DQuat, DVec3};
 
-/// Scales below this one are this one: the logarithm of 0 is not finite.
+/// Scales are raised to this one: the logarithm of 0 is not finite.
 const SMALLEST_SCALE: f32 = 1e-8;
-/// Most equal parts of the duration that are tried as common multiples of windows.
+/// Largest number of equal parts of the duration that is tried so that all windows begin and end between parts.
 const MOST_PARTS: u32 = 4096;
 
 /// Reads a capture.
@@ -84,7 +84,7 @@ pub(crate) fn read(source: &Source<'_>, options: &ReadOptions) -> Result<Importe
     }
     if has_windows {
         lost.push(format!(
-            "Windows of time begin and end at one of {segments} equal parts of the duration, the nearest one."
+            "Windows of time are rounded to the nearest boundary of {segments} equal parts of the duration."
         ));
     }
     let sigmas: Vec<f32> = whole.motion.iter().map(|motion| motion.sigma_t).collect();
@@ -110,7 +110,7 @@ fn up(file: &Scene) -> UpAxis {
     }
 }
 
-/// Returns the Gaussians of a file, without their windows and tracks. Their colors are exact if this program wrote the file.
+/// Returns the Gaussians of a file, without windows and tracks. Their colors are exact if this program wrote the file.
 fn columns(set: &GaussianSet, file: &[u8]) -> Result<Columns, ImportError> {
     let count = set.count();
     let coded = set.sh.as_deref().unwrap_or(&[]);
@@ -130,8 +130,8 @@ fn columns(set: &GaussianSet, file: &[u8]) -> Result<Columns, ImportError> {
     if !is_consistent {
         return Err(ImportError::damaged("its attributes have different numbers of Gaussians"));
     }
-    let rests = exact::rests(file, count, rest * 3)?;
-    let add = |decoded: f64, part: &dyn Fn(&Rests) -> f64| (decoded + rests.as_ref().map_or(0.0, part)) as f32;
+    let residuals = exact::residuals(file, count, rest * 3)?;
+    let add = |decoded: f64, part: &dyn Fn(&Residuals) -> f64| (decoded + residuals.as_ref().map_or(0.0, part)) as f32;
     let mut columns = Columns::with_capacity(count, degree);
     columns.mean.extend_from_slice(set.positions.as_chunks().0);
     let scales = set.scales.as_chunks::<3>().0;
@@ -140,18 +140,18 @@ fn columns(set: &GaussianSet, file: &[u8]) -> Result<Columns, ImportError> {
     for (index, &[red, green, blue, opacity]) in set.colors.as_chunks::<4>().0.iter().enumerate() {
         columns.opacity_logit.push(logit(opacity));
         for (channel, value) in [red, green, blue].into_iter().enumerate() {
-            let color = add(f64::from(value), &|rests| rests.color(index, channel));
+            let color = add(f64::from(value), &|residuals| residuals.color(index, channel));
             columns.harmonics.values.push(coefficient(color));
         }
         let own = coded.get(index * rest * 3..(index + 1) * rest * 3).unwrap_or(&[]);
         for number in 0..rest {
             for (at, &byte) in own.iter().enumerate().skip(number).step_by(rest) {
-                columns.harmonics.values.push(add(sh_coefficient(byte), &|rests| rests.coefficient(index, at)));
+                columns.harmonics.values.push(add(sh_coefficient(byte), &|residuals| residuals.coefficient(index, at)));
             }
         }
     }
     columns.motion = (set.motions.as_chunks::<3>().0.iter().zip(&set.mu_t).zip(&set.sigma_t))
-        // A deviation of 0 is visible at one time alone.
+        // A Gaussian with a standard deviation of 0 is visible at a single time.
         .map(|((&velocity, &mean_t), &sigma_t)| Motion { velocity, mean_t, sigma_t: sigma_t.max(1e-9) })
         .collect();
     Ok(columns)
@@ -171,7 +171,7 @@ fn segments(ends: impl Iterator<Item = f32>, [first, last]: [f32; 2]) -> u32 {
     found.map_or(MAX_SEGMENTS, |count| MAX_SEGMENTS / count * count)
 }
 
-/// Returns what a file has that a scene has not.
+/// Returns a sentence for each thing of a file that a scene cannot have.
 fn not_shown(file: &Scene) -> Vec<String> {
     let mut lost = Vec::new();
     match file.audio_sources.len() {

@@ -1,10 +1,10 @@
 //! The numbers of a `.4dgs` file: multiples of its steps.
 //!
-//! In: Gaussians in the units of the format. Out: [`Coder`]: the streams of a chunk, and the Gaussians that are decoded from it.
+//! In: Gaussians in the units of the format. Out: [`Coder`]: the streams of a chunk, and the Gaussians decoded from it.
 
-use super::exact::LEVEL;
 use super::rows::Row;
 use super::steps::{Times, sigma, sigma_multiple, steps, velocity_class};
+use crate::codec::import::fourdgs::exact::LEVEL;
 use fourdgs::chunk::{DecodedChunk, decode_streams};
 use fourdgs::opcode as op;
 use fourdgs::quantization::{Steps, motion_step, mu_step, quantize_rotation, rct_forward, rint};
@@ -12,19 +12,17 @@ use fourdgs::stream::encode_stream;
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
-/// Relative difference of a number from the nearest one of single precision, in which players have decoded numbers.
+/// Relative rounding of single precision, to which players decode.
 const SINGLE: f64 = f32::EPSILON as f64;
 
-/// What the numbers of a file mean.
+/// The encoding of the numbers of a file.
 #[derive(Debug, Clone)]
 pub(super) struct Coder {
-    /// The steps.
     pub steps: Steps,
     /// The smallest coordinates, from which means are counted.
     pub origin: [f64; 3],
     /// The windows of the Gaussians, each once, in ascending order.
     pub windows: Vec<(f64, f64)>,
-    /// The clip.
     pub times: Times,
 }
 
@@ -56,7 +54,7 @@ impl Coder {
         Ok(streams)
     }
 
-    /// Returns the largest differences of decoded numbers, by the names that the format gives them.
+    /// Returns the largest differences of decoded numbers from the originals, by their names in the format.
     pub(super) fn bounds(&self, rows: &[Row]) -> BTreeMap<String, String> {
         let steps = &self.steps;
         let largest = |values: &dyn Fn(&Row) -> [f64; 3]| {
@@ -83,10 +81,10 @@ impl Coder {
         self.color_multiples(row).map(|multiple| multiple as f64 * self.steps.rgb)
     }
 
-    /// Returns the part of the duration that contains every time at which a decoded Gaussian is visible.
+    /// Returns the first and the last time, in seconds, at which a decoded Gaussian may be visible.
     pub(super) fn life(&self, row: &Row) -> [f64; 2] {
         let mean_t = row.mean_t;
-        // Wider than the difference of the decoded numbers from those of the Gaussian, and than rounding to single precision.
+        // The margins are wider than the rounding to steps and to single precision.
         let half = self.times.reach() * row.sigma_t * (1.0 + 1e-5) + 2.0 * self.steps.time + 1e-6 * mean_t.abs();
         let half = if row.never_fades() { f64::INFINITY } else { half };
         [(mean_t - half).max(row.window[0]), (mean_t + half).min(row.window[1])]
@@ -105,7 +103,7 @@ impl Coder {
         let steps = &self.steps;
         match attribute {
             op::A_POSITION => {
-                // Where it is at the decoded temporal mean, so that the rounding of time moves nothing.
+                // The center at the decoded temporal mean: rounding the time does not move the path.
                 let step = self.time_step(row);
                 let mean = row.center(f64::from((rint(row.mean_t / step) as f64 * step) as f32));
                 to.extend([0, 1, 2].map(|axis| rint((mean[axis] - self.origin[axis]) / steps.pos)));
@@ -134,7 +132,7 @@ impl Coder {
         row.color.map(|channel| rint(channel.clamp(0.0, 1.0) / self.steps.rgb))
     }
 
-    /// Returns the place of the window of a Gaussian, which is among them.
+    /// Returns the index of the window of a Gaussian in `windows`.
     fn window(&self, row: &Row) -> i64 {
         self.windows.partition_point(|window| order(window, &row.window.into()).is_lt()) as i64
     }

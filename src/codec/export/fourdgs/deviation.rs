@@ -1,4 +1,4 @@
-//! How far the Gaussians of a written `.4dgs` file are from those that it was written from.
+//! The difference of the Gaussians of a written `.4dgs` file from their originals.
 //!
 //! In: the bytes of the file, the Gaussians. Out: [`Deviation`], and a sentence with its numbers.
 
@@ -29,10 +29,10 @@ pub(super) struct Deviation {
 }
 
 impl Deviation {
-    /// Decodes the chunks of a file, and compares their Gaussians. `order` has the Gaussian of each place in the file.
+    /// Decodes the chunks of a file, and compares their Gaussians. `order` has the index of each Gaussian of the file.
     ///
     /// # Errors
-    /// A file that is not decoded.
+    /// A file that cannot be decoded.
     pub(super) fn of(file: &[u8], coder: &Coder, rows: &[Row], order: &[usize]) -> fourdgs::Result<Self> {
         let mut deviation = Self::default();
         let mut places = order.iter();
@@ -78,7 +78,7 @@ impl Deviation {
             self.scale = self.scale.max((found - expected).abs().exp_m1());
         }
         let [a, b] = [found.rotation, expected.rotation].map(DQuat::from_array);
-        // Of the vector part of the rotation between both, since the scalar part loses small angles.
+        // The vector part has the length of the sine of half the angle; the scalar part is imprecise for small angles.
         let sine = (a.normalize() * b.normalize().conjugate()).xyz().length().min(1.0);
         self.angle = self.angle.max(2.0 * sine.asin().to_degrees());
         self.opacity = self.opacity.max((found.opacity - expected.opacity).abs());

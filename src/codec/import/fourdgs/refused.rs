@@ -1,10 +1,7 @@
-//! The functions of a build without the feature `fourdgs`.
+//! The reader of a build without the feature `fourdgs`.
 //!
 //! In: a file. Out: an error with the line that builds a command with the feature.
 
-use crate::codec::export::error::ExportError;
-use crate::codec::export::table::Clip;
-use crate::codec::import::columns::Columns;
 use crate::codec::import::source::Source;
 use crate::codec::import::{ImportError, Imported};
 use crate::codec::options::ReadOptions;
@@ -16,15 +13,5 @@ use crate::codec::options::ReadOptions;
 pub(crate) fn read(_: &Source<'_>, _: &ReadOptions) -> Result<Imported, ImportError> {
     Err(ImportError::unsupported(
         "a .4dgs file, which this build does not read: build with `--features fourdgs`, or convert it with the command gs4d",
-    ))
-}
-
-/// Refuses to write a file.
-///
-/// # Errors
-/// Always.
-pub(crate) fn encode(_: &Columns, _: &Clip) -> Result<(Vec<u8>, Vec<String>), ExportError> {
-    Err(ExportError::Unsupported(
-        "this build does not write .4dgs files: build with `--features fourdgs`, or use the command gs4d".to_owned(),
     ))
 }

@@ -1,17 +1,17 @@
-//! Colors of a `.4dgs` file: what the format holds, and what it does not.
+//! Colors of a `.4dgs` file: the bytes of the format, and their residuals.
 //!
-//! In: the color coefficients of Gaussians. Out: [`Colors`]: a byte for each coefficient of degree 1 and above, and the rest that it leaves.
+//! In: color coefficients. Out: [`Colors`]: a byte and a residual for each coefficient of degree 1 and above.
 //!
-//! The format has 256 values from -4 to 4 for each coefficient, and colors of degree 0 from 0 to 1. The rests are written to a record of this
-//! program, `exact`, which other players skip.
+//! The format has 256 values from -4 to 4 for each coefficient, and colors of degree 0 from 0 to 1. The residuals are
+//! written to a record of this program, `import::fourdgs::exact`, which other players skip.
 
-use super::exact::COEFFICIENT;
 use super::steps::REACH;
+use crate::codec::import::fourdgs::exact::COEFFICIENT;
 use crate::gaussian::Harmonics;
 use fourdgs::quantization::{SH_QUANT_HI, SH_QUANT_LO, sh_coefficient};
 use fourdgs::sh::band_range;
 
-/// Degrees whose coefficients are all smaller are left out: their bytes are farther from 0.
+/// Degrees whose coefficients are all smaller are left out: the bytes nearest to 0 differ more from it.
 const SMALLEST: f32 = 1.0 / 1024.0;
 
 /// Coefficients of degree 1 and above.
@@ -23,9 +23,9 @@ pub(super) struct Colors {
     pub coefficients: usize,
     /// Three times as many bytes for each Gaussian: all of red, of green, of blue.
     codes: Vec<u8>,
-    /// What the bytes leave, in multiples of the step of a rest, in the same order.
-    rests: Vec<i32>,
-    /// The largest difference between a coefficient and that of its byte.
+    /// The residuals of the bytes, in multiples of [`COEFFICIENT`], in the same order.
+    residuals: Vec<i32>,
+    /// The largest magnitude of a residual.
     pub worst: f64,
 }
 
@@ -34,26 +34,26 @@ impl Colors {
     pub(super) fn of(harmonics: &Harmonics) -> Self {
         let degree = degree(harmonics);
         let coefficients = (degree as usize + 1).pow(2) - 1;
-        let mut colors = Self { degree, coefficients, codes: Vec::new(), rests: Vec::new(), worst: 0.0 };
+        let mut colors = Self { degree, coefficients, codes: Vec::new(), residuals: Vec::new(), worst: 0.0 };
         for (index, own) in harmonics.values.chunks_exact(harmonics.coefficients * 3).enumerate() {
             for number in 0..coefficients * 3 {
                 let (channel, coefficient) = (number / coefficients, number % coefficients);
                 let value = f64::from(own[(coefficient + 1) * 3 + channel]);
                 // Both bytes beside 0 are equally near: they alternate, so that not all errors have one sign.
                 let code = code(value, (index + number).is_multiple_of(2));
-                let rest = value - sh_coefficient(code);
+                let residual = value - sh_coefficient(code);
                 colors.codes.push(code);
-                colors.rests.push((rest / COEFFICIENT).round().clamp(-REACH, REACH) as i32);
-                colors.worst = colors.worst.max(rest.abs());
+                colors.residuals.push((residual / COEFFICIENT).round().clamp(-REACH, REACH) as i32);
+                colors.worst = colors.worst.max(residual.abs());
             }
         }
         colors
     }
 
-    /// Returns the rests of a Gaussian.
-    pub(super) fn rests(&self, index: usize) -> &[i32] {
+    /// Returns the residuals of a Gaussian.
+    pub(super) fn residuals(&self, index: usize) -> &[i32] {
         let width = self.coefficients * 3;
-        &self.rests[index * width..][..width]
+        &self.residuals[index * width..][..width]
     }
 
     /// Returns the bytes of a Gaussian in a band, 1 to 3.
@@ -64,7 +64,7 @@ impl Colors {
     }
 }
 
-/// Returns the highest degree that has a coefficient which is not small.
+/// Returns the highest degree with a coefficient of at least [`SMALLEST`].
 fn degree(harmonics: &Harmonics) -> u8 {
     let is_used = |degree: u32| {
         let [first, last] = [degree as usize, degree as usize + 1].map(|side| side * side * 3);
@@ -109,7 +109,7 @@ mod tests {
         let band: Vec<i64> = colors.band(0, 2).collect();
         assert_eq!(band.len(), 15, "five coefficients of three channels");
         assert_eq!(band[6], i64::from(code(0.5, true)), "the second coefficient of green");
-        let found = sh_coefficient(code(0.5, true)) + COEFFICIENT * f64::from(colors.rests(0)[8 + 4]);
-        assert!((found - 0.5).abs() <= COEFFICIENT / 2.0, "byte and rest together: {found}");
+        let found = sh_coefficient(code(0.5, true)) + COEFFICIENT * f64::from(colors.residuals(0)[8 + 4]);
+        assert!((found - 0.5).abs() <= COEFFICIENT / 2.0, "byte and residual together: {found}");
     }
 }

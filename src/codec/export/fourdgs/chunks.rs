@@ -1,27 +1,27 @@
 //! The chunks of a `.4dgs` file: groups of Gaussians that a player loads for a part of the duration.
 //!
-//! In: when each Gaussian is visible, and times at which windows begin and end. Out: the chunks, the longest first. A Gaussian is in the shortest part
-//! that contains its life: the whole duration, a part between two of the times, or such a part halved again and again.
+//! In: when each Gaussian is visible, and times at which windows begin and end. Out: the chunks, the longest first. A
+//! Gaussian is in the shortest part that contains its life: the whole duration, a part between two of the times, or
+//! such a part halved again and again.
 
 use std::collections::BTreeMap;
 
 /// Most halvings of a part.
 const DEEPEST: u32 = 6;
-/// Fewest Gaussians of a half; those of a smaller one are in the whole.
+/// Fewest Gaussians of a half; those of a smaller half are in the part that was halved.
 const FEWEST: usize = 2048;
 
-/// A chunk.
+/// A chunk, with the indices of its Gaussians.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Chunk {
     /// Its part of the duration, seconds.
     pub times: [f64; 2],
     /// How often the part was halved.
     pub level: u32,
-    /// Its Gaussians.
     pub members: Vec<usize>,
 }
 
-/// A part of the duration: the number of the part between two times, of halvings, and of the half.
+/// A part of the duration: the index of its interval between two bounds, the number of halvings, the index of the half.
 type Part = (usize, u32, u32);
 
 /// Returns the chunks. `bounds` are the times in ascending order, the first and the last of the duration included.
@@ -48,7 +48,7 @@ pub(super) fn chunks(lives: &[[f64; 2]], bounds: &[f64]) -> Vec<Chunk> {
     chunks
 }
 
-/// Returns the shortest part that contains a life; `None` if only the whole duration does, or not even that.
+/// Returns the shortest part that contains a life; `None` if only the whole duration, or nothing, contains it.
 fn part(&[first, last]: &[f64; 2], bounds: &[f64]) -> Option<Part> {
     let number = bounds.partition_point(|&bound| bound <= first).checked_sub(1)?;
     let contains = |part: Part| {
@@ -91,7 +91,7 @@ mod tests {
 
     #[test]
     fn a_gaussian_is_in_a_chunk_that_contains_its_life() {
-        // Enough lives of a tenth of a second for chunks of an eighth of the duration; few lives of a hundredth; lives outside the duration.
+        // Enough lives of 0.1 s for chunks of an eighth of the duration; few lives of 0.01 s; lives outside of it.
         let mut lives: Vec<[f64; 2]> = (0..40_000).map(|i| f64::from(i) / 10_000.0).map(|t| [t, t + 0.1]).collect();
         lives.extend((0..100).map(|i| f64::from(i) / 50.0).map(|t| [t, t + 0.01]));
         lives.extend([[-1.0, 0.2], [0.0, 9.0], [7.0, 8.0], [1.0, 0.5]]);

@@ -1,9 +1,9 @@
 //! Gaussians in the units of the format: seconds from the beginning of the file, capture units.
 //!
-//! In: [`Columns`] and how they are played. Out: a [`Row`] for each Gaussian; an interval of the temporal filter is its window.
+//! In: [`Columns`] and how they are played. Out: a [`Row`] for each Gaussian, whose window is its active interval.
 
+use crate::codec::export::clip::Clip;
 use crate::codec::export::error::ExportError;
-use crate::codec::export::table::Clip;
 use crate::codec::import::columns::{Columns, SH_C0};
 use crate::scene::FilterKind;
 
@@ -25,11 +25,11 @@ pub(super) struct Row {
     pub opacity: f64,
     /// Its velocity, units per second.
     pub velocity: [f64; 3],
-    /// Its temporal mean.
+    /// Its temporal mean, seconds.
     pub mean_t: f64,
-    /// Its temporal standard deviation; infinite if it never fades.
+    /// Its temporal standard deviation, seconds; infinite if it never fades.
     pub sigma_t: f64,
-    /// When it exists.
+    /// Begin and end of its existence, seconds.
     pub window: [f64; 2],
 }
 
@@ -44,7 +44,8 @@ impl Row {
         [0, 1, 2].map(|axis| self.mean[axis] + self.velocity[axis] * (time - self.mean_t))
     }
 
-    /// Returns the first and the last time at which it is visible in a clip of this duration, where `reach` deviations are; `None` if it never is.
+    /// Returns the first and the last time at which it is visible, within `reach` standard deviations of its temporal
+    /// mean, in a clip of this duration in seconds; `None` if it never is.
     pub(super) fn visible(&self, duration: f64, reach: f64) -> Option<[f64; 2]> {
         let half = if self.never_fades() { f64::INFINITY } else { reach * self.sigma_t };
         let first = (self.mean_t - half).max(self.window[0]).max(0.0);
@@ -93,9 +94,9 @@ pub(super) fn rows(columns: &Columns, clip: &Clip, duration: f64) -> Result<Vec<
     }
 }
 
-/// Returns when each Gaussian exists; nothing if all exist always.
+/// Returns begin and end of the existence of each Gaussian, in seconds; an empty list if all exist always.
 fn windows(columns: &Columns, duration: f64) -> Result<Vec<[f64; 2]>, ExportError> {
-    // A filter of lifespans shows nothing that they do not show.
+    // A support filter repeats the lifespans.
     let Some(filter) = columns.filter.as_ref().filter(|filter| filter.kind != FilterKind::Support) else {
         return Ok(Vec::new());
     };

@@ -1,6 +1,6 @@
-//! The memory of a package and its levels of detail, which a reader bounds by the length of the file.
+//! The limit of the memory of a package with its levels of detail, which follows from the length of the file.
 //!
-//! In: the header of a package, then the bytes of each level. Out: the header of the level; an error if all together would take too much.
+//! In: the header of a package, then the bytes of each level. Out: the header of the level; an error above the limit.
 
 use super::check::unpacked_limit;
 use super::envelope;
@@ -9,19 +9,18 @@ use super::header::Header;
 use std::io::Cursor;
 
 /// The bytes that a package and its levels of detail take when they are read, and their limit.
-pub(super) struct Room {
+pub(super) struct MemoryLimit {
     raw: u64,
     limit: u64,
 }
 
-impl Room {
+impl MemoryLimit {
     /// Returns the bytes of the scene of a header, and the limit for a file of this length.
     pub(super) fn of(header: &Header, file_length: u64) -> Self {
         Self { raw: header.unpacked(), limit: unpacked_limit(file_length) }
     }
 
-    /// Returns the header of a level of detail, and the position after it. The level must be within the limit and have no
-    /// levels itself.
+    /// Returns the header of a level of detail, which must be within the limit and have no levels, and its end.
     pub(super) fn header_of_level(&mut self, body: &[u8]) -> Result<(Header, u64), PackageError> {
         let mut reader = Cursor::new(body);
         let (header, _) = envelope::read(&mut reader)?;
