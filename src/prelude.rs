@@ -1,11 +1,12 @@
 //! The names that a game needs, to be imported beside Bevy's own: `use bevy_gs4d::prelude::*;`.
 //!
-//! In: the modules of the plugin. Out: in their order, the plugins, the capture and its component, messages, playback, settings and picking.
+//! In: the modules of the plugin. Out: plugins, the capture and its component, messages, playback, settings, picking.
 //!
-//! Other crates export everything at once, too. Every name of this prelude therefore begins with `Capture`, `Gaussian` or `Playback`, except
-//! `Upright`. Shorter names stay in their modules: `Repeat`, `Markers`, `FollowsClock`, `MarkerReached` and timelines in
-//! [`playback`](crate::playback), `CropBox` and `DepthWrite` in [`render`](crate::render), shadows in `pbr`, eyes in
-//! [`stereo`](crate::stereo), `BlendSpace` and `DebugView` in [`view`](crate::view).
+//! Other crates export everything at once, too. Every name of this prelude therefore begins with `Capture`, `Gaussian`
+//! or `Playback`, except `Upright`. Shorter names stay in their modules: `Repeat`, `Markers`, `FollowsClock`,
+//! `MarkerReached` and timelines in [`playback`](crate::playback), `CropBox` and `DepthWrite` in
+//! [`render`](crate::render), shadows in `pbr`, eyes in [`stereo`](crate::stereo), `BlendSpace` and `DebugView` in
+//! [`view`](crate::view).
 //!
 //! ```no_run
 //! use bevy::prelude::*;

@@ -11,12 +11,12 @@ use super::{asset, playback, render, stereo};
 use bevy::app::plugin_group;
 
 plugin_group! {
-    /// Loads, plays and draws captures. Add it once, after `DefaultPlugins`, and spawn [`GaussianCapture3d`](crate::GaussianCapture3d)s.
-    /// Cameras need no component for captures.
+    /// Loads, plays and draws captures. Add it once, after `DefaultPlugins`, and spawn
+    /// [`GaussianCapture3d`](crate::GaussianCapture3d)s. Cameras need no component for captures.
     ///
-    /// Each part can be left out. Only [`CaptureAssetPlugin`](asset::CaptureAssetPlugin) is needed by others: by all but
-    /// [`StereoPlugin`](stereo::StereoPlugin). If a plugin of Bevy that a part needs is added later than the part or not at all, the log
-    /// has a warning with the remedy, and the app goes on.
+    /// Each part can be left out. Only [`CaptureAssetPlugin`](asset::CaptureAssetPlugin) is needed by others: by all
+    /// but [`StereoPlugin`](stereo::StereoPlugin). If a plugin of Bevy that a part needs is added later than the part
+    /// or not at all, the log has a warning with the remedy, and the app goes on.
     ///
     /// # Examples
     ///

@@ -1,8 +1,8 @@
 //! Captures in a Bevy app: everything that uses Bevy.
 //!
 //! In: an app with Bevy's `DefaultPlugins`, or at least its `MinimalPlugins` and `AssetPlugin`. Out: the same app, in
-//! which captures load, play and, if it has a renderer, are drawn. The crate root re-exports these modules but `component`, whose items are at the root and in [`asset`]. Each uses
-//! only modules before it:
+//! which captures load, play and, if it has a renderer, are drawn. The crate root re-exports these modules except
+//! `component`, whose items are at the root and in [`asset`]. Each module uses only modules before it:
 //!
 //! ```text
 //! component ──▶ asset ──▶ playback ──▶ render ──▶ pbr, picker, stereo ──▶ picking_backend, inspector, testing
@@ -19,8 +19,8 @@
 //! * `inspector` (feature `inspector`): a panel that shows and edits captures
 //! * `testing` (feature `testing`): apps without a window, rendered to pictures
 //!
-//! [`GaussianCapturePlugins`] adds the plugins of all of them to an app except the inspector's. `picker` and `testing` have no plugin. The
-//! crate root has tables of the components and the sets of systems.
+//! [`GaussianCapturePlugins`] adds the plugins of all of them to an app except the inspector's. `picker` and `testing`
+//! have no plugin. The crate root has tables of the components and the sets of systems.
 
 pub mod asset;
 mod capture_plugins;

@@ -1,7 +1,7 @@
 //! Why a capture is not shown.
 //!
-//! In: an error of Bevy's asset server, or of the renderer. Out: a [`CaptureFailure`], which games can tell apart, and whose text names the
-//! file, the fault and, if there is one, the remedy.
+//! In: an error of Bevy's asset server, or of the renderer. Out: a [`CaptureFailure`], which games can tell apart, and
+//! whose text names the file, the fault and, if there is one, the remedy.
 
 use super::loader::CaptureLoadError;
 use crate::renderer::GpuError;
@@ -9,7 +9,8 @@ use bevy::asset::AssetLoadError;
 use bevy::asset::io::AssetReaderError;
 use bevy::reflect::Reflect;
 
-/// Why a capture could not be loaded, or cannot be drawn. Its text names the file, the fault and, if there is one, the remedy.
+/// Why a capture could not be loaded, or cannot be drawn. Its text names the file, the fault and, if there is one, the
+/// remedy.
 ///
 /// The field `path` is the path of the asset; of captures that were not loaded from a file, their identifier.
 ///
@@ -60,8 +61,8 @@ pub enum CaptureFailure {
         /// The fault and the remedy.
         reason: String,
     },
-    /// Bevy could not load the asset for another reason, for example because no loader is registered for the extension. The text names the
-    /// path, if the asset has one.
+    /// Bevy could not load the asset for another reason, for example because no loader is registered for the extension.
+    /// The text names the path, if the asset has one.
     #[error("{0}")]
     NotLoaded(String),
     /// No capture can be drawn on this GPU or in this app.
@@ -113,8 +114,8 @@ pub enum CaptureFailure {
 }
 
 impl CaptureFailure {
-    /// Returns the failure of loading an asset, without the names of loaders and types with which Bevy's message begins. `path`: the path of
-    /// the asset; `None` if it has none.
+    /// Returns the failure of loading an asset, without the names of loaders and types with which Bevy's message
+    /// begins. `path`: the path of the asset; `None` if it has none.
     pub(super) fn of_loading(path: Option<String>, error: &AssetLoadError) -> Self {
         let Some(path) = path else { return Self::NotLoaded(error.to_string()) };
         match error {

@@ -1,10 +1,11 @@
 //! The messages about loading.
 //!
-//! In: a change of an entity's [`CaptureState`](super::CaptureState). Out: each message in two ways: as a message for a `MessageReader`, and
-//! as an event on that entity for observers: `commands.entity(capture).observe(|failed: On<CaptureFailed>| ..)`.
+//! In: a change of an entity's [`CaptureState`](super::CaptureState). Out: each message in two ways: as a message for a
+//! `MessageReader`, and as an event on that entity for observers: `commands.entity(capture).observe(|failed:
+//! On<CaptureFailed>| ..)`.
 //!
-//! They are sent in `PreUpdate`, in [`CaptureAssetSystems`](super::CaptureAssetSystems) and, for captures that the GPU cannot draw, after
-//! it: systems in `Update` read them in the same frame.
+//! They are sent in `PreUpdate`, in [`CaptureAssetSystems`](super::CaptureAssetSystems) and, for captures that the GPU
+//! cannot draw, after it: systems in `Update` read them in the same frame.
 
 use super::failure::CaptureFailure;
 use crate::plugin::component::GaussianCapture;
@@ -14,9 +15,9 @@ use bevy::ecs::event::EntityEvent;
 use bevy::ecs::message::{Message, MessageWriter};
 use bevy::ecs::system::{Commands, SystemParam};
 
-/// An entity's capture is loaded, completely uploaded to the GPU and drawn: for the first time, again after its file or the asset changed
-/// or the device was lost, or because the entity's handle now names another capture that is already uploaded. Sent at the latest two frames
-/// after the capture is first drawn; without a renderer, once it is loaded.
+/// An entity's capture is loaded, completely uploaded to the GPU and drawn: for the first time, again after its file or
+/// the asset changed or the device was lost, or because the entity's handle now names another capture that is already
+/// uploaded. Sent at the latest two frames after the capture is first drawn; without a renderer, once it is loaded.
 ///
 /// # Examples
 ///
@@ -41,11 +42,11 @@ pub struct CaptureReady {
     pub capture: AssetId<GaussianCapture>,
 }
 
-/// An entity's capture could not be loaded, or this GPU cannot draw it. If the capture was drawn before and its file changed, the old
-/// capture is still drawn.
+/// An entity's capture could not be loaded, or this GPU cannot draw it. If the capture was drawn before and its file
+/// changed, the old capture is still drawn.
 ///
-/// Sent once for each entity until loading succeeds or fails with another error, independent of the number of attempts. Bevy also logs the
-/// error of every attempt.
+/// Sent once for each entity until loading succeeds or fails with another error, independent of the number of attempts.
+/// Bevy also logs the error of every attempt.
 ///
 /// # Examples
 ///

@@ -1,26 +1,26 @@
 //! Captures as Bevy assets.
 //!
-//! In: the bytes of a `.gs4d` package, a `.pth` checkpoint or a capture of another make, from any Bevy asset source. Out: a [`GaussianCapture`], decoded on
-//! the asset task pool and shared by any number of entities; on each entity a [`CaptureState`], and messages when it changes.
+//! In: the bytes of a package, a checkpoint or a file of another make, from any Bevy asset source, and
+//! [`CaptureLoaderSettings`]. Out: a [`GaussianCapture`], decoded on the asset task pool and shared by any number of
+//! entities; on each entity a [`CaptureState`], and messages when it changes.
 //!
 //! ```text
-//! file ──▶ PackageLoader, CheckpointLoader ──▶ GaussianCapture ──▶ PackageSaver ──▶ file
-//!          ImportLoader│                              │
-//!                      │ fails                        │ is loaded, or loaded again
-//!                      ▼                 fails        ▼
-//!                CaptureFailed ◀─────────────── upload to the GPU
-//!                                                     │ is complete
-//!                                                     ▼
-//!                                               CaptureReady             and CaptureState on the entity
+//! file ──▶ CaptureLoader ──▶ GaussianCapture ──▶ PackageSaver ──▶ file
+//!                │                  │
+//!                │ fails            │ is loaded, or loaded again
+//!                ▼        fails     ▼
+//!          CaptureFailed ◀─── upload to the GPU
+//!                                   │ is complete
+//!                                   ▼
+//!                             CaptureReady             and CaptureState on the entity
 //! ```
 //!
 //! In `AssetMode::Processed` a [`CaptureProcessor`] makes packages of checkpoints before the game loads them.
 //!
-//! Loading runs off the main thread (in browsers in short steps on it), and uploading is spread over frames: neither blocks a frame. When a
-//! file changes that Bevy watches, or
-//! a game calls `AssetServer::reload`, the old capture is drawn until the new one is on the GPU. If the new capture is invalid or does not
-//! fit, the old one stays. A capture and its GPU memory are freed with its last handle. Without a renderer, captures are ready once they are
-//! loaded.
+//! Loading runs off the main thread, in browsers on it with pauses, and uploading is spread over frames: neither blocks
+//! a frame. When a file changes that Bevy watches, or a game calls `AssetServer::reload`, the old capture is drawn
+//! until the new one is on the GPU. If the new capture is invalid or does not fit, the old one stays. A capture and its
+//! GPU memory are freed with its last handle. Without a renderer, captures are ready once they are loaded.
 
 mod failure;
 mod loader;
@@ -36,7 +36,7 @@ mod uploads;
 
 pub use super::component::{GaussianCapture, KeyFrames};
 pub use failure::CaptureFailure;
-pub use loader::{CaptureLoadError, CheckpointLoader, ImportLoader, PackageLoader, PackageLoaderSettings};
+pub use loader::{CaptureLoadError, CaptureLoader, CaptureLoaderSettings};
 pub(crate) use messages::send;
 pub use messages::{CaptureFailed, CaptureReady};
 pub(crate) use parts::{set_up, set_up_late};

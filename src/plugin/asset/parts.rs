@@ -1,7 +1,7 @@
 //! The order of plugins: parts of [`GaussianCapturePlugins`](crate::GaussianCapturePlugins) that need loaded captures.
 //!
-//! In: the plugins of an app, in any order. Out: each part set up once, as soon as captures can be loaded, at the latest when the app starts;
-//! warnings.
+//! In: the plugins of an app, in any order. Out: each part set up once, as soon as captures can be loaded, at the
+//! latest when the app starts; warnings.
 
 use super::plugin::CaptureAssetPlugin;
 use super::uploads::Uploads;
@@ -23,8 +23,8 @@ pub(crate) fn set_up<P: Plugin>(app: &mut App, add: fn(&mut App)) {
     }
 }
 
-/// Sets up a part that could not be set up before, because Bevy's `AssetPlugin` was added later: for `Plugin::finish`. Warns, with the name
-/// of the part, if the app has no [`CaptureAssetPlugin`].
+/// Sets up a part that could not be set up before, because Bevy's `AssetPlugin` was added later: for `Plugin::finish`.
+/// Warns, with the name of the part, if the app has no [`CaptureAssetPlugin`].
 pub(crate) fn set_up_late<P: Plugin>(app: &mut App, part: &str, add: fn(&mut App)) {
     set_up::<P>(app, add);
     if !app.is_plugin_added::<CaptureAssetPlugin>() {

@@ -1,12 +1,37 @@
-//! A pause of a long task, so that a browser can draw and answer: there all tasks run on the thread of the page.
+//! Pauses of a long task: in a browser all tasks run on the thread of the page, which draws and answers in a pause.
+//! Elsewhere the other tasks of the thread have their turn.
 //!
-//! In: nothing. Out: a future that is ready after the browser has had its turn; elsewhere at once.
+//! In: the steps of a task. Out: after some of them, a pause.
+
+/// Steps between two pauses: 1 MiB of work with [`Loading::STEP`](crate::codec::Loading::STEP), a frame or two on a
+/// slow machine. Pauses after every step would take longer than the work: a browser makes each at least 4 ms long.
+const STEPS: u32 = 16;
+
+/// The pauses of a task.
+#[derive(Debug, Default)]
+pub(super) struct Pauses {
+    /// Steps since the last pause.
+    steps: u32,
+}
+
+impl Pauses {
+    /// Counts a step, and pauses after every [`STEPS`].
+    pub(super) async fn after_step(&mut self) {
+        self.steps += 1;
+        if self.steps == STEPS {
+            self.steps = 0;
+            pause().await;
+        }
+    }
+}
 
 #[cfg(not(target_arch = "wasm32"))]
-pub(super) async fn pause() {}
+async fn pause() {
+    bevy::tasks::futures_lite::future::yield_now().await;
+}
 
 #[cfg(target_arch = "wasm32")]
-pub(super) async fn pause() {
+async fn pause() {
     use js_sys::{Function, Promise, Reflect, global};
     let turn = Promise::new(&mut |resolve, _| {
         let timer = Reflect::get(&global(), &"setTimeout".into()).map(Function::from);

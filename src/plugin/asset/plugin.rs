@@ -1,8 +1,9 @@
-//! The asset plugin: the loaders, the processor, the loading state of entities, and its messages.
+//! The asset plugin: the loader, the processor, the loading state of entities, and its messages.
 //!
-//! In: an app with Bevy's `AssetPlugin`. Out: the same app, in which captures load and every entity with one has a [`CaptureState`].
+//! In: an app with Bevy's `AssetPlugin`. Out: the same app, in which captures load and every entity with one has a
+//! [`CaptureState`].
 
-use super::loader::{CheckpointLoader, ImportLoader, PackageLoader};
+use super::loader::CaptureLoader;
 use super::messages::{CaptureFailed, CaptureReady};
 use super::processor;
 use super::state::{CaptureAssetSystems, CaptureState};
@@ -52,9 +53,7 @@ fn add(app: &mut App) {
     app.init_asset::<GaussianCapture>()
         .init_resource::<Uploads>()
         .register_required_components::<GaussianCapture3d, CaptureState>()
-        .init_asset_loader::<PackageLoader>()
-        .init_asset_loader::<CheckpointLoader>()
-        .init_asset_loader::<ImportLoader>()
+        .init_asset_loader::<CaptureLoader>()
         .add_message::<CaptureReady>()
         .add_message::<CaptureFailed>()
         .configure_sets(PreUpdate, CaptureAssetSystems.after(AssetTrackingSystems))

@@ -1,12 +1,13 @@
-//! The processor: from captures of any loader to packages, while the game's assets are processed.
+//! The processor: from captures of any format to packages, while the game's assets are processed.
 //!
-//! In: a capture that a loader of another format has read, and [`CaptureTransformerSettings`], which a `.meta` file beside the source contains. Out: a
-//! package in the folder of processed assets, which the game loads by the name of the source.
+//! In: a capture of any format, and [`CaptureTransformerSettings`], which a `.meta` file beside the source contains.
+//! Out: a package in the folder of processed assets, which the game loads by the name of the source.
 //!
-//! Bevy processes assets in `AssetMode::Processed`. A source without a `.meta` file is processed with the default settings; where one exists, it
-//! names the processor and the settings, and the source is processed again when either of them changes.
+//! Bevy processes assets in `AssetMode::Processed`. A source without a `.meta` file is processed with the default
+//! settings; where one exists, it names the processor and the settings, and the source is processed again when either
+//! of them changes.
 
-use super::loader::CheckpointLoader;
+use super::loader::CaptureLoader;
 use super::saver::PackageSaver;
 use crate::codec::checkpoint;
 use crate::gaussian::InvalidGaussian;
@@ -21,22 +22,22 @@ use bevy::asset::transformer::{AssetTransformer, TransformedAsset};
 use bevy::reflect::TypePath;
 use serde::{Deserialize, Serialize};
 
-/// Processes the captures of a loader into packages. Checkpoints are processed so unless their `.meta` file says otherwise; for another loader a
-/// game registers it:
+/// Processes captures into packages. Checkpoints are processed so unless their `.meta` file says otherwise; a game
+/// makes it the default of further extensions:
 ///
 /// ```
 /// use bevy::prelude::*;
-/// use bevy_gs4d::asset::{CaptureProcessor, CaptureTransformer, PackageLoader, PackageSaver};
+/// use bevy_gs4d::asset::CaptureProcessor;
 ///
 /// /// Packs packages, too: those that were made without loss, for instance.
 /// fn pack_packages(app: &mut App) {
-///     app.register_asset_processor(CaptureProcessor::<PackageLoader>::new(CaptureTransformer, PackageSaver));
-///     app.set_default_asset_processor::<CaptureProcessor<PackageLoader>>("gs4d");
+///     app.set_default_asset_processor::<CaptureProcessor>("gs4d");
 /// }
 /// ```
-pub type CaptureProcessor<L> = LoadTransformAndSave<L, CaptureTransformer, PackageSaver>;
+pub type CaptureProcessor = LoadTransformAndSave<CaptureLoader, CaptureTransformer, PackageSaver>;
 
-/// Makes captures smaller: packs them, lowers the degrees of their color, adds a temporal filter. Errors: [`CaptureTransformError`].
+/// Makes captures smaller: packs them, lowers the degrees of their color, adds a temporal filter. Errors:
+/// [`CaptureTransformError`].
 #[derive(Debug, Default, Clone, Copy, TypePath)]
 #[type_path = "bevy_gs4d::asset"]
 pub struct CaptureTransformer;
@@ -53,8 +54,8 @@ pub struct CaptureTransformerSettings {
     pub sh_degree: u32,
     /// Highest time degree of color that is kept, 0 to 2. Default: 2.
     pub sh_degree_t: u32,
-    /// Number of segments of time of a support filter, which leaves out Gaussians that are not visible in a segment; `None` keeps the filter of
-    /// the source, if it has one. Stills get none. Default: 10.
+    /// Number of segments of time of a support filter, which leaves out Gaussians that are not visible in a segment;
+    /// `None` keeps the filter of the source, if it has one. Stills get none. Default: 10.
     pub segments: Option<u32>,
 }
 
@@ -65,7 +66,8 @@ impl Default for CaptureTransformerSettings {
     }
 }
 
-/// The form of the Gaussians of a processed capture. The trained form, which offline tools need, is not among them: loaders of a game slice it.
+/// The form of the Gaussians of a processed capture. The trained form, which offline tools need, is not among them: the
+/// loader of a game slices it.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum ProcessedForm {
@@ -102,8 +104,9 @@ impl AssetTransformer for CaptureTransformer {
         capture: TransformedAsset<GaussianCapture>,
         settings: &'a CaptureTransformerSettings,
     ) -> Result<TransformedAsset<GaussianCapture>, CaptureTransformError> {
-        let scene = transformed(capture.scene().clone(), settings)?;
-        Ok(capture.replace_asset(GaussianCapture::new(scene)))
+        let processed = GaussianCapture::new(transformed(capture.scene().clone(), settings)?);
+        let usages = capture.usages();
+        Ok(capture.replace_asset(processed.with_usages(usages)))
     }
 }
 
@@ -134,11 +137,11 @@ fn transformed(
     Ok(scene)
 }
 
-/// Registers the processor of checkpoints, and makes it their default. Without Bevy's processor nothing is registered.
+/// Registers the processor, and makes it the default of checkpoints. Without Bevy's processor nothing is registered.
 pub(super) fn register(app: &mut App) {
-    app.register_asset_processor(CaptureProcessor::<CheckpointLoader>::new(CaptureTransformer, PackageSaver));
+    app.register_asset_processor(CaptureProcessor::new(CaptureTransformer, PackageSaver));
     for extension in checkpoint::EXTENSIONS {
-        app.set_default_asset_processor::<CaptureProcessor<CheckpointLoader>>(extension);
+        app.set_default_asset_processor::<CaptureProcessor>(extension);
     }
 }
 

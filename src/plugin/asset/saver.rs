@@ -1,9 +1,9 @@
 //! The saver: from a capture in memory to a package.
 //!
-//! In: a [`GaussianCapture`] and [`PackageSaverSettings`]. Out: the bytes of a `.gs4d` file, in any asset source that Bevy can write,
-//! which [`PackageLoader`] loads as the same capture.
+//! In: a [`GaussianCapture`] and [`PackageSaverSettings`]. Out: the bytes of a `.gs4d` file, in any asset source that
+//! Bevy can write, which [`CaptureLoader`] loads as the same capture.
 
-use super::loader::{PackageLoader, PackageLoaderSettings};
+use super::loader::{CaptureLoader, CaptureLoaderSettings};
 use crate::codec::package::{self, PackageError, WriteSettings};
 use crate::plugin::component::GaussianCapture;
 use crate::scene::GaussianScene;
@@ -51,7 +51,7 @@ impl Default for PackageSaverSettings {
 pub enum CaptureSaveError {
     /// The Gaussians have been dropped from memory.
     #[error(
-        "the Gaussians of the capture are on the GPU only: load it with RenderAssetUsages::default() in PackageLoaderSettings, or \
+        "the Gaussians of the capture are on the GPU only: load it with RenderAssetUsages::default() in CaptureLoaderSettings, or \
          save it before it is drawn"
     )]
     Released,
@@ -66,7 +66,7 @@ pub enum CaptureSaveError {
 impl AssetSaver for PackageSaver {
     type Asset = GaussianCapture;
     type Settings = PackageSaverSettings;
-    type OutputLoader = PackageLoader;
+    type OutputLoader = CaptureLoader;
     type Error = CaptureSaveError;
 
     async fn save(
@@ -75,7 +75,7 @@ impl AssetSaver for PackageSaver {
         capture: SavedAsset<'_, '_, GaussianCapture>,
         settings: &PackageSaverSettings,
         _path: AssetPath<'_>,
-    ) -> Result<PackageLoaderSettings, CaptureSaveError> {
+    ) -> Result<CaptureLoaderSettings, CaptureSaveError> {
         if capture.is_released() {
             return Err(CaptureSaveError::Released);
         }
@@ -83,6 +83,7 @@ impl AssetSaver for PackageSaver {
         let scene = GaussianScene::from(capture.scene().clone());
         package::write(&mut bytes, &scene, &WriteSettings { level: settings.level })?;
         writer.write_all(&bytes).await?;
-        Ok(PackageLoaderSettings::default())
+        // All other settings are in the package.
+        Ok(CaptureLoaderSettings { asset_usage: capture.usages(), ..CaptureLoaderSettings::default() })
     }
 }

@@ -33,9 +33,11 @@ pub enum CaptureState {
     /// Not loaded, or not completely uploaded to the GPU. Nothing is drawn.
     #[default]
     Loading,
-    /// Loaded and drawn; without a renderer, loaded. While another version is loaded and uploaded, the old one is drawn.
+    /// Loaded and drawn; without a renderer, loaded. While another version is loaded and uploaded, the old one is
+    /// drawn.
     Ready,
-    /// Could not be loaded or uploaded. `AssetServer::reload`, or a change of a file that Bevy watches, loads the capture again.
+    /// Could not be loaded or uploaded. `AssetServer::reload`, or a change of a file that Bevy watches, loads the
+    /// capture again.
     Failed(CaptureFailure),
 }
 
@@ -55,6 +57,7 @@ impl CaptureState {
     }
 }
 
-/// The set of the systems that update each [`CaptureState`] and send its messages: in `PreUpdate`, after Bevy's `AssetTrackingSystems`.
+/// The set of the systems that update each [`CaptureState`] and send its messages: in `PreUpdate`, after Bevy's
+/// `AssetTrackingSystems`.
 #[derive(SystemSet, Debug, Clone, PartialEq, Eq, Hash)]
 pub struct CaptureAssetSystems;

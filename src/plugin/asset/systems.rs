@@ -4,8 +4,8 @@
 //! [`CaptureState`], and the messages [`CaptureReady`](super::messages::CaptureReady) and
 //! [`CaptureFailed`](super::messages::CaptureFailed).
 //!
-//! A capture that is among the assets and drawn is ready, independent of the server's load state: when a reload of a loaded capture fails,
-//! the server reports the capture as failed, but Bevy keeps the old one.
+//! A capture that is among the assets and drawn is ready, independent of the server's load state: when a reload of a
+//! loaded capture fails, the server reports the capture as failed, but Bevy keeps the old one.
 
 use super::failure::CaptureFailure;
 use super::messages::Announcer;
@@ -76,7 +76,8 @@ pub(super) fn update_states(
                 announcer.failed(entity, error.clone());
             }
         } else if let Some(error) = failed.get(&id) {
-            // Independent of the server's load state: Bevy repeats a failed reload immediately, so it may be loading again.
+            // Independent of the server's load state: Bevy repeats a failed reload immediately, so it may be loading
+            // again.
             state.set_if_neq(CaptureState::Failed(error.clone()));
             announcer.failed(entity, error.clone());
         } else if let Some(LoadState::Failed(error)) = server.get_load_state(id) {
@@ -94,8 +95,9 @@ pub(super) fn update_states(
     }
 }
 
-/// The failures to load that have been reported. Bevy repeats a failed reload immediately, a watched file may change several times in one
-/// save, and a game may try again every second: each failure is reported once, until the capture loads or fails with another error.
+/// The failures to load that have been reported. Bevy repeats a failed reload immediately, a watched file may change
+/// several times in one save, and a game may try again every second: each failure is reported once, until the capture
+/// loads or fails with another error.
 #[derive(Default)]
 pub(super) struct ReportedFailures(HashMap<AssetId<GaussianCapture>, CaptureFailure>);
 
@@ -116,8 +118,8 @@ pub(super) fn any_upload_failure(uploads: Res<Uploads>) -> bool {
     !uploads.lock().failures.is_empty()
 }
 
-/// Sends a message once for each failed attempt to upload a capture, and sets the state of its entities unless an older version of the
-/// capture is still drawn.
+/// Sends a message once for each failed attempt to upload a capture, and sets the state of its entities unless an older
+/// version of the capture is still drawn.
 pub(super) fn report_upload_failures(
     uploads: Res<Uploads>,
     mut captures: Query<(Entity, &GaussianCapture3d, &mut CaptureState)>,

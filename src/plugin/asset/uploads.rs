@@ -1,7 +1,7 @@
 //! The upload state of loaded captures.
 //!
-//! In: the render world's reports: captures whose upload is complete, and the errors of failed uploads. Out: [`Uploads`], shared by both
-//! worlds, which decides the loading states of entities and when playback begins.
+//! In: the render world's reports: captures whose upload is complete, and the errors of failed uploads. Out:
+//! [`Uploads`], shared by both worlds, which decides the loading states of entities and when playback begins.
 
 use super::failure::CaptureFailure;
 use crate::plugin::component::GaussianCapture;
@@ -40,7 +40,8 @@ impl UploadStates {
         !self.expected || self.drawn.contains(&capture)
     }
 
-    /// Returns the captures whose upload has ended since the last call; `None` without a render world that uploads captures.
+    /// Returns the captures whose upload has ended since the last call; `None` without a render world that uploads
+    /// captures.
     pub(super) fn take_finished(&mut self) -> Option<HashSet<AssetId<GaussianCapture>>> {
         self.expected.then(|| std::mem::take(&mut self.finished))
     }
@@ -58,7 +59,8 @@ impl Uploads {
         !states.is_drawn(capture) && !states.failures.contains_key(&capture)
     }
 
-    /// Records that the upload of a capture begins. `is_drawn`: whether an earlier version is drawn until the upload ends.
+    /// Records that the upload of a capture begins. `is_drawn`: whether an earlier version is drawn until the upload
+    /// ends.
     pub(crate) fn begin(&self, capture: AssetId<GaussianCapture>, is_drawn: bool) {
         let mut states = self.lock();
         states.failures.remove(&capture);

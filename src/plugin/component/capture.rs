@@ -1,7 +1,7 @@
 //! The asset type: a scene ready to draw, shared.
 //!
-//! In: a [`RuntimeScene`]. Out: a [`GaussianCapture`], cheap to clone, with its bounds, the extent of its Gaussians, its duration and its up
-//! direction.
+//! In: a [`RuntimeScene`]. Out: a [`GaussianCapture`], cheap to clone, with its bounds, the extent of its Gaussians,
+//! its duration and its up direction.
 
 use super::key_frames::KeyFrames;
 use crate::gaussian::{Gaussian, Harmonics};
@@ -42,8 +42,8 @@ pub struct GaussianCapture {
 
 impl GaussianCapture {
     /// Creates a capture from a scene in memory, and computes its bounds over time from every Gaussian. A packed scene
-    /// whose parts do not fit together ([`PackedScene::check`](crate::scene::PackedScene::check)) has no bounds, and cannot
-    /// be drawn.
+    /// whose parts do not fit together ([`PackedScene::check`](crate::scene::PackedScene::check)) has no bounds, and
+    /// cannot be drawn.
     pub fn new(scene: RuntimeScene) -> Self {
         let usages = RenderAssetUsages::default();
         let mut capture = Self { scene: Arc::new(scene), bounds: None, extent: 0.0, usages, is_released: false };
@@ -67,9 +67,10 @@ impl GaussianCapture {
         capture
     }
 
-    /// Returns the capture with other usages. With `RenderAssetUsages::RENDER_WORLD` alone, the Gaussians are dropped from memory once they are
-    /// on the GPU. Such a capture plays as others do, but [`scene`](Self::scene) has no Gaussians then: it can be neither picked nor saved,
-    /// and after a lost device it must be loaded again. Default: both worlds. `MAIN_WORLD` alone counts as both.
+    /// Returns the capture with other usages. With `RenderAssetUsages::RENDER_WORLD` alone, the Gaussians are dropped
+    /// from memory once they are on the GPU. Such a capture plays as others do, but [`scene`](Self::scene) has no
+    /// Gaussians then: it can be neither picked nor saved, and after a lost device it must be loaded again. Default:
+    /// both worlds. `MAIN_WORLD` alone counts as both.
     pub fn with_usages(self, usages: RenderAssetUsages) -> Self {
         Self { usages, ..self }
     }
@@ -93,7 +94,8 @@ impl GaussianCapture {
         Some(std::mem::replace(self, released))
     }
 
-    /// Returns the scene. After the Gaussians have been [released](Self::is_released), it has only the settings and levels without Gaussians.
+    /// Returns the scene. After the Gaussians have been [released](Self::is_released), it has only the settings and
+    /// levels without Gaussians.
     pub fn scene(&self) -> &RuntimeScene {
         &self.scene
     }
@@ -108,14 +110,14 @@ impl GaussianCapture {
         self.bounds.as_ref().map(|bounds| bounds.whole())
     }
 
-    /// Returns the box that encloses the Gaussians drawn at `seconds` since the start, and up to a 32nd of the duration earlier and later,
-    /// in capture space; `None` if no Gaussian is drawn then.
+    /// Returns the box that encloses the Gaussians drawn at `seconds` since the start, and up to a 32nd of the duration
+    /// earlier and later, in capture space; `None` if no Gaussian is drawn then.
     pub fn bounds_at(&self, seconds: f32) -> Option<Bounds> {
         self.bounds.as_ref()?.at(self.time_at(seconds))
     }
 
-    /// Returns the typical extent of the Gaussians, a standard deviation in capture space: the error of the depth of a pixel, since a splat has
-    /// one depth. 0 for an empty capture.
+    /// Returns the typical extent of the Gaussians, a standard deviation in capture space: the error of the depth of a
+    /// pixel, since a splat has one depth. 0 for an empty capture.
     pub(crate) fn extent(&self) -> f32 {
         self.extent
     }
@@ -126,8 +128,8 @@ impl GaussianCapture {
         if seconds.is_finite() { seconds.max(0.0) } else { 0.0 }
     }
 
-    /// Returns the timestamp, in the capture's own unit of time, at `seconds` since its start. Seconds outside the capture are clamped;
-    /// NaN counts as 0.
+    /// Returns the timestamp, in the capture's own unit of time, at `seconds` since its start. Seconds outside the
+    /// capture are clamped; NaN counts as 0.
     pub fn time_at(&self, seconds: f32) -> f32 {
         let [first, last] = self.scene.trained_with.time_interval;
         let duration = self.duration_seconds();
@@ -182,8 +184,8 @@ impl Extents {
         self.count += 1;
     }
 
-    /// Returns the extent above three quarters of the samples, weighted by opacity. Small Gaussians are numerous but cover little of a picture;
-    /// the few large Gaussians of a sky have no influence. 0 without Gaussians.
+    /// Returns the extent above three quarters of the samples, weighted by opacity. Small Gaussians are numerous but
+    /// cover little of a picture; the few large Gaussians of a sky have no influence. 0 without Gaussians.
     fn upper_quartile(mut self) -> f32 {
         self.samples.sort_by(|a, b| a.0.total_cmp(&b.0));
         let below = 0.75 * self.samples.iter().map(|(_, opacity)| opacity).sum::<f32>();

@@ -1,6 +1,6 @@
 //! The component that places a capture in the world.
 //!
-//! In: the handle of a [`GaussianCapture`]. Out: an entity that each `Camera3d` with the entity in view draws once the asset is loaded.
+//! In: the handle of a [`GaussianCapture`]. Out: an entity that each `Camera3d` draws once the asset is loaded.
 
 use super::capture::GaussianCapture;
 use bevy::asset::{AssetId, Handle};
@@ -15,18 +15,18 @@ use bevy::transform::components::Transform;
 /// Places a capture in the world.
 ///
 /// The entity's transform (translation, rotation, any scale) maps capture space to the world. Most captures have +z up:
-/// [`Upright`](super::Upright) stands them upright. A perspective camera draws no Gaussian nearer than 0.2 units *of the capture*, as in training; an orthographic
-/// camera draws from its near plane on.
+/// [`Upright`](super::Upright) stands them upright. A perspective camera draws no Gaussian nearer than 0.2 units *of
+/// the capture*, as in training; an orthographic camera draws from its near plane on.
 ///
-/// [`Visibility`], `RenderLayers` and frustum culling decide which cameras draw the capture, as they do for meshes. The entity's
-/// `Aabb` encloses the Gaussians drawn at the current time. A capture with an environment map surrounds every camera: it has no `Aabb`
-/// and is never culled.
+/// [`Visibility`], `RenderLayers` and frustum culling decide which cameras draw the capture, as they do for meshes. The
+/// entity's `Aabb` encloses the Gaussians drawn at the current time. A capture with an environment map surrounds every
+/// camera: it has no `Aabb` and is never culled.
 ///
 /// [`GaussianCapturePlugins`](crate::GaussianCapturePlugins) also require [`CaptureState`](crate::asset::CaptureState),
-/// [`Playback`](crate::playback::Playback) and [`CaptureSettings`](crate::render::CaptureSettings): they are inserted with their
-/// defaults unless the game spawns them together with this component.
+/// [`Playback`](crate::playback::Playback) and [`CaptureSettings`](crate::render::CaptureSettings): they are inserted
+/// with their defaults unless the game spawns them together with this component.
 ///
-/// Default: a handle of no asset, with which nothing is drawn. A warning in the log names an entity that keeps this handle, once.
+/// Default: a handle of no asset, with which nothing is drawn. The log has one warning for an entity with this handle.
 ///
 /// # Examples
 ///

@@ -1,7 +1,7 @@
 //! The key-frames of a capture: the times between which its temporal filter is constant.
 //!
-//! In: the filter's number of segments and the capture's duration. Out: the times of the key-frames, evenly spaced from the start to the
-//! end, and the key-frames between two times.
+//! In: the filter's number of segments and the capture's duration. Out: the times of the key-frames, evenly spaced from
+//! the start to the end, and the key-frames between two times.
 
 /// The key-frames of a capture: the bounds of its temporal filter's segments, evenly spaced.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,11 +35,11 @@ impl KeyFrames {
         f64::from(self.duration) / f64::from(self.segments)
     }
 
-    /// Returns the indices of the key-frames after `from` (or at `from`, if `inclusive`) up to and including `to`, in the order of
-    /// play: descending if `to` is before `from`. Both times are in seconds since the capture's start.
+    /// Returns the indices of the key-frames after `from` (or at `from`, if `inclusive`) up to and including `to`, in
+    /// the order of play: descending if `to` is before `from`. Both times are in seconds since the capture's start.
     pub(crate) fn within(&self, from: f64, to: f64, inclusive: bool) -> impl Iterator<Item = u32> + use<> {
         let this = *self;
-        // Rounded to the precision of key-frame times: the duration divided by the spacing may be just below the number of segments.
+        // Rounded to the precision of key-frame times: `duration / spacing` may be just below the number of segments.
         let [from, to] = [from, to].map(|time| f64::from(time as f32));
         let [low, high] = [from.min(to), from.max(to)].map(|time| time / this.spacing());
         let first = (low - 1.0).max(0.0) as u32;

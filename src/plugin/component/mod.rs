@@ -1,8 +1,8 @@
 //! The capture asset and the component that places it in the world: every other module of the plugin builds on these.
 //!
-//! In: a scene in memory, a handle. Out: a [`GaussianCapture`] that entities share, and an entity with a [`GaussianCapture3d`], which
-//! cameras draw once the asset is loaded. The other components of such an entity (loading state, playback, settings) are registered as
-//! required components by the plugins that own them.
+//! In: a scene in memory, a handle. Out: a [`GaussianCapture`] that entities share, and an entity with a
+//! [`GaussianCapture3d`], which cameras draw once the asset is loaded. The other components of such an entity (loading
+//! state, playback, settings) are registered as required components by the plugins that own them.
 
 mod capture;
 mod capture_3d;

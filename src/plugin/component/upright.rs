@@ -1,7 +1,7 @@
 //! Captures that stand upright.
 //!
-//! In: an entity with [`Upright`], the up direction of its capture. Out: the same entity with its transform turned, once the capture is
-//! loaded.
+//! In: an entity with [`Upright`], the up direction of its capture. Out: the same entity with its transform turned,
+//! once the capture is loaded.
 
 use super::capture::GaussianCapture;
 use super::capture_3d::GaussianCapture3d;
@@ -18,12 +18,13 @@ use glam::Quat;
 /// Stands a capture upright, whichever axis its dataset has as up. Add it to an entity with a [`GaussianCapture3d`].
 ///
 /// When the capture has been loaded, and before it is first drawn, the entity's [`Transform`] is turned once by
-/// [`GaussianCapture::upright`]: `rotation` becomes the rotation set by the game, multiplied by `upright`. The game's rotation therefore
-/// acts on the upright capture: `Transform::from_rotation(Quat::from_rotation_y(..))` turns it about the vertical. When the entity's handle
-/// or the capture's file changes, only the difference between the old and the new up direction is applied.
+/// [`GaussianCapture::upright`]: `rotation` becomes the rotation set by the game, multiplied by `upright`. The game's
+/// rotation therefore acts on the upright capture: `Transform::from_rotation(Quat::from_rotation_y(..))` turns it about
+/// the vertical. When the entity's handle or the capture's file changes, only the difference between the old and the
+/// new up direction is applied.
 ///
-/// Rendering, picking, bounds and children use the transform as usual. A game that sets `rotation` again later replaces all of it: turn the
-/// entity by `rotate`, or turn a parent.
+/// Rendering, picking, bounds and children use the transform as usual. A game that sets `rotation` again later replaces
+/// all of it: turn the entity by `rotate`, or turn a parent.
 ///
 /// # Examples
 ///
@@ -42,8 +43,8 @@ use glam::Quat;
 #[require(Transform, UprightTurn)]
 pub struct Upright;
 
-/// The rotation by which [`Upright`] has turned an entity's transform. Scene files contain it, so that an entity that is loaded with its
-/// transform is not turned again. Games neither insert nor change it. Default: none.
+/// The rotation by which [`Upright`] has turned an entity's transform. Scene files contain it, so that an entity that
+/// is loaded with its transform is not turned again. Games neither insert nor change it. Default: none.
 #[derive(Component, Reflect, Debug, Default, Clone, Copy, PartialEq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
 #[type_path = "bevy_gs4d"]

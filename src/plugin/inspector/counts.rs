@@ -6,8 +6,8 @@ use super::presentation::{count, fraction, frame_rate};
 use crate::renderer::ViewStatistics;
 use bevy_egui::egui;
 
-/// Draws the section. `view` has the statistics of the shown camera, `None` before it has drawn a capture; `frame_seconds` is the mean time
-/// of a frame.
+/// Draws the section. `view` has the statistics of the shown camera, `None` before it has drawn a capture;
+/// `frame_seconds` is the mean time of a frame.
 pub(super) fn show(ui: &mut egui::Ui, view: Option<&ViewStatistics>, frame_seconds: f32) {
     ui.label(frame_rate(frame_seconds));
     let Some(view) = view else {

@@ -1,6 +1,6 @@
 //! The entity selector: the lists from which a user selects the capture and the camera that the panel shows.
 //!
-//! In: entities with a name or an asset path. Out: the entity to show, and the entity that the user selects from the list.
+//! In: entities with a name or an asset path. Out: the entity to show, and the entity that the user selects.
 
 use crate::plugin::asset::CaptureState;
 use bevy::ecs::entity::Entity;

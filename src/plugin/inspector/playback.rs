@@ -41,7 +41,7 @@ fn buttons(ui: &mut egui::Ui, playback: &mut Playback, duration: f32, fps: &mut 
         if ui.button("back").on_hover_text("one frame back").clicked() {
             playback.step(-1, *fps, duration);
         }
-        if ui.button("on").on_hover_text("one frame forward").clicked() {
+        if ui.button("next").on_hover_text("one frame forward").clicked() {
             playback.step(1, *fps, duration);
         }
         let rate = DragValue::new(fps).range(1.0..=240.0).clamp_existing_to_range(false);

@@ -1,7 +1,7 @@
 //! The plugin and the panel.
 //!
-//! In: captures, cameras, [`CaptureStatistics`]. Out: the panel, and its warnings, also while the panel is closed. Only edited values are
-//! written to components.
+//! In: captures, cameras, [`CaptureStatistics`]. Out: the panel, and its warnings, also while the panel is closed. Only
+//! edited values are written to components.
 
 use super::entity_selector::{self, Choice};
 use super::presentation::smoothed;
@@ -38,12 +38,12 @@ use bevy_egui::{
 use std::any::TypeId;
 use std::collections::HashSet;
 
-/// Draws the panel that [the module](crate::inspector) describes at the right edge of the first camera's picture. The panel is initially
-/// open; F1 closes and opens it.
+/// Draws the panel that [the module](crate::inspector) describes at the right edge of the first camera's picture. The
+/// panel is initially open; F1 closes and opens it.
 ///
-/// Add it after `DefaultPlugins` and [`GaussianCapturePlugins`](crate::GaussianCapturePlugins). It adds `EguiPlugin` unless the app already
-/// has it. It also works without a window. When the panel's camera is despawned, another camera draws the panel, unless
-/// [`EguiGlobalSettings::auto_create_primary_context`] is off.
+/// Add it after `DefaultPlugins` and [`GaussianCapturePlugins`](crate::GaussianCapturePlugins). It adds `EguiPlugin`
+/// unless the app already has it. It also works without a window. When the panel's camera is despawned, another camera
+/// draws the panel, unless [`EguiGlobalSettings::auto_create_primary_context`] is off.
 #[derive(Debug, Default, Clone, Copy)]
 pub struct InspectorPlugin;
 
@@ -85,8 +85,8 @@ fn toggle(keys: Res<ButtonInput<KeyCode>>, mut inspector: ResMut<Inspector>) {
     }
 }
 
-/// Moves the panel to another camera when its own camera has been despawned, which `bevy_egui` does not do. Prefers a camera that draws
-/// into a window.
+/// Moves the panel to another camera when its own camera has been despawned, which `bevy_egui` does not do. Prefers a
+/// camera that draws into a window.
 fn move_context(
     settings: Res<EguiGlobalSettings>,
     contexts: Query<(), With<PrimaryEguiContext>>,

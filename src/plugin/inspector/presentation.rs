@@ -45,14 +45,14 @@ pub(super) fn frame_rate(seconds: f32) -> String {
     }
 }
 
-/// Returns the mean of about the last twenty values, from the previous `mean` and the newest value. A previous `mean` of 0 means that
-/// there is no value yet.
+/// Returns the mean of about the last twenty values, from the previous `mean` and the newest value. A previous `mean`
+/// of 0 means that there is no value yet.
 pub(super) fn smoothed(mean: f32, value: f32) -> f32 {
     if mean > 0.0 { mean + (value - mean) * 0.05 } else { value }
 }
 
-/// Returns the positions between `left` and `right` of marks at ascending `times` in a duration of `duration` seconds. Of marks closer
-/// than two points, only the first is kept.
+/// Returns the positions between `left` and `right` of marks at ascending `times` in a duration of `duration` seconds.
+/// Of marks closer than two points, only the first is kept.
 pub(super) fn mark_positions(times: impl Iterator<Item = f32>, duration: f32, left: f32, right: f32) -> Vec<f32> {
     const APART: f32 = 2.0;
     let mut positions: Vec<f32> = Vec::new();

@@ -32,16 +32,16 @@ pub struct Inspector {
     pub open: bool,
     /// The key that closes and opens the panel. Default: F1.
     pub key: KeyCode,
-    /// The entity whose capture is shown. If `None`, or if the entity has no capture, the first capture is shown. Default: `None`.
+    /// The entity whose capture is shown; the first capture if `None`, or if the entity has none. Default: `None`.
     pub selected: Option<Entity>,
-    /// The camera whose view is shown. If `None`, or if the entity is not a `Camera3d`, the first camera is shown. Default: `None`.
+    /// The camera whose view is shown; the first if `None`, or if the entity is no `Camera3d`. Default: `None`.
     pub camera: Option<Entity>,
     /// Frame rate of the step buttons, in frames per second. Default: 30.
     pub fps: f32,
     /// A line of text at the end of the panel. Default: empty, which draws no line.
     pub note: String,
-    /// The warnings at the top of the panel. Written at the end of each update in which they change, also while the panel is closed.
-    /// Default: empty.
+    /// The warnings at the top of the panel. Written at the end of each update in which they change, also while the
+    /// panel is closed. Default: empty.
     pub warnings: Vec<String>,
 }
 

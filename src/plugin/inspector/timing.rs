@@ -1,7 +1,7 @@
 //! The section "GPU time": the time of each pass.
 //!
-//! In: whether the section is open, the measured passes. Out: bars. Measuring is on only while the section is open, because it takes time
-//! itself.
+//! In: whether the section is open, the measured passes. Out: bars. Measuring is on only while the section is open,
+//! because it takes time itself.
 
 use super::counts::bar;
 use super::presentation::fraction;
@@ -20,7 +20,7 @@ pub(super) struct Measuring {
 }
 
 impl Measuring {
-    /// Starts measuring when the section is opened, and stops when it is closed. Measurements that the game has started continue.
+    /// Measures from the opening to the closing of the section. Measurements that the game has started continue.
     pub(super) fn follow(&mut self, open: bool, statistics: &CaptureStatistics) {
         if self.on != open {
             *self = Self { on: open, waited: 0 };

@@ -1,6 +1,6 @@
 //! The section "warnings": reasons why captures are not visible.
 //!
-//! In: the state of every capture and every camera. Out: a list of texts, each with the name of the capture or camera and the remedy.
+//! In: the state of every capture and camera. Out: a list of texts, each with the capture or camera and the remedy.
 
 use crate::plugin::asset::CaptureState;
 use crate::plugin::component::GaussianCapture;
@@ -20,7 +20,7 @@ pub(super) struct PlacedCapture<'a> {
     pub(super) shows: bool,
     /// Whether an active camera has the capture in view.
     pub(super) is_seen: bool,
-    /// The times at which the temporal filter, if it is on, leaves no Gaussian active, in seconds since the capture's start.
+    /// The times at which the temporal filter, if on, leaves no Gaussian active, in seconds since the capture's start.
     pub(super) idle: &'a [Range<f32>],
 }
 
@@ -44,7 +44,8 @@ pub(super) fn list(captures: &[PlacedCapture], cameras: &[PlacedCamera]) -> Vec<
         }
         if *is_multisampled && *writes_depth {
             warnings.push(format!(
-                "{label}: with multisampling, the written depth of captures is the same for all samples of a pixel; switch one of the two off if this is visible"
+                "{label}: with multisampling, the written depth of captures is the same for all samples of a pixel; \
+                 switch multisampling or the written depth off if this is visible"
             ));
         }
     }
@@ -61,14 +62,15 @@ fn about_capture(capture: &PlacedCapture, without_cameras: bool, warnings: &mut 
             if without_cameras {
                 warnings.push(format!("{label}: there is no active Camera3d"));
             } else if capture.shows && !capture.is_seen {
-                warnings
-                    .push(format!("{label}: no camera sees it: it is outside their views, or on other render layers"));
+                warnings.push(format!(
+                    "{label}: no camera sees it; move it into the view of a camera, or onto RenderLayers of a camera"
+                ));
             }
             if let Some((first, more)) = capture.idle.split_first() {
                 let others = if more.is_empty() { "" } else { ", and at other times" };
                 warnings.push(format!(
-                    "{label}: no Gaussian is active from {:.2} s to {:.2} s{others}; switch its temporal filter off, or create \
-                     the filter again with gs4d mask",
+                    "{label}: no Gaussian is active from {:.2} s to {:.2} s{others}; switch its temporal filter off, \
+                     or create the filter again with gs4d mask",
                     first.start, first.end
                 ));
             }

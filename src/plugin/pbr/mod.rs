@@ -1,7 +1,7 @@
 //! Captures among Bevy's lit meshes: the parts that need Bevy's lights and materials.
 //!
-//! In: an app in which captures are drawn, with Bevy's `PbrPlugin`. Out: the same app, in which captures and meshes form one scene, with
-//! common order, fog, light and shadows.
+//! In: an app in which captures are drawn, with Bevy's `PbrPlugin`. Out: the same app, in which captures and meshes
+//! form one scene, with common order, fog, light and shadows.
 
 mod contact_shadow;
 mod order;

@@ -1,12 +1,12 @@
 //! Order: finds the transmissive meshes and wireframes that a camera draws.
 //!
-//! In: Bevy's transmissive phase and wireframes; meshes that have moved. Out: [`OtherPasses`], which places captures before the
-//! transmissive meshes in front of them. Bevy 0.19 sorts a transparent mesh by its position when it came into view, so this module also
-//! updates the positions of moved meshes.
+//! In: Bevy's transmissive phase and wireframes; meshes that have moved. Out: [`OtherPasses`], which places captures
+//! before the transmissive meshes in front of them. Bevy 0.19 sorts a transparent mesh by its position when it came
+//! into view, so this module also updates the positions of moved meshes.
 
 use crate::plugin::component::GaussianCapture3d;
 use crate::plugin::render::CaptureSystems;
-use crate::plugin::render::order::{OtherPass, OtherPasses};
+use crate::plugin::render::views::order::{OtherPass, OtherPasses};
 use bevy::app::{App, SubApp};
 use bevy::camera::Camera3d;
 use bevy::camera::primitives::Aabb;
@@ -29,8 +29,8 @@ use bevy::render::{ExtractSchedule, Render, RenderApp, RenderSystems};
 use bevy::transform::components::GlobalTransform;
 use glam::Vec3;
 
-/// The meshes that have moved since the previous frame, with the centers of their bounds in world space. Empty while there are no captures;
-/// all meshes in the first frame with captures.
+/// The meshes that have moved since the previous frame, with the centers of their bounds in world space. Empty while
+/// there are no captures; all meshes in the first frame with captures.
 #[derive(Resource, Default)]
 struct MovedMeshes(Vec<(MainEntity, Vec3)>);
 
@@ -60,7 +60,7 @@ pub(super) fn is_built(render_app: &SubApp) -> bool {
     render_app.world().contains_resource::<MovedMeshes>()
 }
 
-/// Returns the extraction of the meshes that have moved. It is skipped while there are no meshes and no moved meshes to clear.
+/// Returns the extraction of moved meshes, which is skipped without meshes and without moved meshes to clear.
 fn extraction() -> ScheduleConfigs<ScheduleSystem> {
     extract_moved_meshes.run_if(any_mesh.or_else(any_moved))
 }

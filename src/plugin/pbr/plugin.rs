@@ -1,13 +1,14 @@
 //! The plugin that combines captures with lit meshes.
 //!
-//! In: an app in which captures are drawn. Out: the same app with the order among lit meshes, shading, cast shadows and contact shadows.
+//! In: an app in which captures are drawn. Out: order among lit meshes, shading, cast shadows and contact shadows.
 
 use super::{contact_shadow, order, shade, shadow};
 use crate::plugin::render::has_captures;
 use bevy::app::{App, Plugin};
 use bevy::render::RenderApp;
 
-/// Combines captures with lit meshes: fog, shadows, light of the scene. Part of [`GaussianCapturePlugins`](crate::GaussianCapturePlugins).
+/// Combines captures with lit meshes: fog, shadows, light of the scene. Part of
+/// [`GaussianCapturePlugins`](crate::GaussianCapturePlugins).
 #[derive(Debug, Default, Clone, Copy)]
 pub struct CapturePbrPlugin;
 

@@ -27,7 +27,11 @@ use std::sync::Arc;
 /// use bevy_gs4d::prelude::*;
 ///
 /// /// Describes a hit. Means of Gaussians are in capture space, hit points in world space.
-/// fn describe(hit: &CaptureHit, captures: &Assets<GaussianCapture>, placed: &Query<&GaussianCapture3d>) -> Option<String> {
+/// fn describe(
+///     hit: &CaptureHit,
+///     captures: &Assets<GaussianCapture>,
+///     placed: &Query<&GaussianCapture3d>,
+/// ) -> Option<String> {
 ///     let capture = captures.get(&placed.get(hit.entity).ok()?.0)?;
 ///     let gaussian = capture.scene().iter().nth(hit.gaussian)?;
 ///     Some(format!("{} away at {}: mean {:?}", hit.distance, hit.point, gaussian.mean))
@@ -48,8 +52,8 @@ pub struct CaptureHit {
 
 /// Casts rays at captures: a system parameter.
 ///
-/// [`GlobalTransform`] places the captures; Bevy updates it in `PostUpdate`. The parameter reads [`Playback`], [`CaptureSettings`] and
-/// [`GlobalTransform`] of captures: to change these components in the same system, use a `ParamSet`.
+/// [`GlobalTransform`] places the captures; Bevy updates it in `PostUpdate`. The parameter reads [`Playback`],
+/// [`CaptureSettings`] and [`GlobalTransform`]: to change these components in the same system, use a `ParamSet`.
 ///
 /// # Examples
 ///
@@ -83,14 +87,15 @@ type Placed = (
 );
 
 impl CapturePicker<'_, '_> {
-    /// Returns the nearest hit among all captures that are loaded and not hidden, whether a camera sees them or not; `None` if the ray hits
-    /// none. Each capture is tested alone: the ray passes through two captures that absorb half of the light only together.
+    /// Returns the nearest hit among all captures that are loaded and not hidden, whether a camera sees them or not;
+    /// `None` if the ray hits none. Each capture is tested alone: the ray passes through two captures that absorb half
+    /// of the light only together.
     pub fn cast(&self, ray: Ray3d) -> Option<CaptureHit> {
         Aim::cast_all(&self.aims(ray, |_, visibility| visibility.get(), |_| true)).first().copied()
     }
 
-    /// Returns the searches of a ray in all captures for which `takes_part` is true and whose box it meets, nearest box first. `blocks` says
-    /// whether a capture hides the captures behind it from the ray.
+    /// Returns the searches of a ray in all captures for which `takes_part` is true and whose box it meets, nearest box
+    /// first. `blocks` says whether a capture hides the captures behind it from the ray.
     pub(crate) fn aims(
         &self,
         ray: Ray3d,
@@ -105,12 +110,12 @@ impl CapturePicker<'_, '_> {
         aims
     }
 
-    /// Returns the hit of one capture, hidden or not; `None` if the ray misses it, it is not loaded, or its scale is 0.
+    /// Returns the hit of one capture, hidden or not; `None` if the ray misses it, or it is not loaded or has scale 0.
     pub fn cast_on(&self, entity: Entity, ray: Ray3d) -> Option<CaptureHit> {
         self.aim(self.captures.get(entity).ok()?, ray)?.cast(f32::INFINITY)
     }
 
-    /// Returns the search of a ray in one capture; `None` if the ray misses its box, it is not loaded, or its scale is 0.
+    /// Returns the search of a ray in one capture; `None` if the ray misses its box, or as for [`Self::cast_on`].
     fn aim(
         &self,
         (entity, handle, settings, playback, transform, _, fade): ROQueryItem<'_, '_, Placed>,
@@ -119,8 +124,8 @@ impl CapturePicker<'_, '_> {
         let capture = self.assets.get(&handle.0)?;
         if capture.is_released() {
             warn_once_each(&format!(
-                "capture {entity} is not picked: its Gaussians are on the GPU only; load it with RenderAssetUsages::default() in \
-                 PackageLoaderSettings, or let rays pass it with Pickable::IGNORE"
+                "capture {entity} is not picked: its Gaussians are on the GPU only; load it with \
+                 RenderAssetUsages::default() in CaptureLoaderSettings, or let rays pass it with Pickable::IGNORE"
             ));
             return None;
         }

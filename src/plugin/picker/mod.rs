@@ -1,8 +1,8 @@
 //! Picker: finds the capture, the Gaussian and the point that a ray hits.
 //!
-//! In: a ray in world space, and all visible captures at their current times, with their temporal filter, opacity, fade and crop. Out: a
-//! [`CaptureHit`], found by [`RuntimeScene::pick`](crate::scene::RuntimeScene::pick): the Gaussian at which half of the light along the ray
-//! is absorbed.
+//! In: a ray in world space, and all visible captures at their current times, with their temporal filter, opacity, fade
+//! and crop. Out: a [`CaptureHit`], found by [`RuntimeScene::pick`](crate::scene::RuntimeScene::pick): the Gaussian at
+//! which half of the light along the ray is absorbed.
 //!
 //! ```no_run
 //! # use bevy::prelude::*;
@@ -24,8 +24,8 @@
 //! }
 //! ```
 //!
-//! `Camera::viewport_to_world` returns the ray under the cursor. A ray costs a few arithmetic operations per Gaussian of every capture
-//! whose box it meets, on all cores: cast a few rays per frame, not one per pixel.
+//! `Camera::viewport_to_world` returns the ray under the cursor. A ray costs a few arithmetic operations per Gaussian
+//! of every capture whose box it meets, on all cores: cast a few rays per frame, not one per pixel.
 
 mod capture_picker;
 

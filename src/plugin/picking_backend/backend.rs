@@ -1,6 +1,6 @@
 //! The backend: turns the rays of pointers into hits.
 //!
-//! In: Bevy's map of rays; cameras and captures with their layers and `Pickable`. Out: one `PointerHits` for each ray that hits a capture.
+//! In: Bevy's map of rays; cameras and captures with layers and `Pickable`. Out: `PointerHits` of each ray that hits.
 
 use super::searches::Searches;
 use super::settings::{CapturePickingCamera, CapturePickingSettings};
@@ -23,7 +23,7 @@ pub(super) fn any_ray(rays: Option<Res<RayMap>>) -> bool {
     rays.is_some_and(|rays| rays.iter().next().is_some())
 }
 
-/// Casts the rays of this frame and writes the hits that are known: of this frame for small captures, of an earlier frame for large ones.
+/// Casts the rays of this frame and writes the known hits, on large captures possibly those of an earlier frame.
 pub(super) fn update_hits(
     picking: Res<PickingSettings>,
     settings: Res<CapturePickingSettings>,

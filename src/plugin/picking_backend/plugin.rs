@@ -10,8 +10,8 @@ use bevy::app::{App, Plugin, PreUpdate};
 use bevy::ecs::schedule::{IntoScheduleConfigs, SystemCondition};
 use bevy::picking::PickingSystems;
 
-/// Sends the hits of pointers on captures in apps with Bevy's `PickingPlugin`, which may be added before or after. Part of
-/// [`GaussianCapturePlugins`](crate::GaussianCapturePlugins).
+/// Sends the hits of pointers on captures in apps with Bevy's `PickingPlugin`, which may be added before or after. Part
+/// of [`GaussianCapturePlugins`](crate::GaussianCapturePlugins).
 #[derive(Debug, Default, Clone, Copy)]
 pub struct CapturePickingPlugin;
 

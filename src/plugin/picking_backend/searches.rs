@@ -2,9 +2,9 @@
 //!
 //! In: in each frame, the captures whose boxes a ray meets. Out: the hits of the newest finished search of the ray.
 //!
-//! A search visits every Gaussian, so its time must not be part of a frame. Small captures are searched at once; large ones in Bevy's
-//! `AsyncComputeTaskPool`, one search per ray at a time, always of the newest ray: the hits are then those of a ray some frames ago. While
-//! neither the pointer nor a capture under it has changed, nothing is searched.
+//! A search visits every Gaussian, so its time must not be part of a frame. Small captures are searched at once; large
+//! ones in Bevy's `AsyncComputeTaskPool`, one search per ray at a time, always of the newest ray: the hits are then
+//! those of a ray some frames ago. While neither the pointer nor a capture under it has changed, nothing is searched.
 
 use crate::plugin::picker::{Aim, CaptureHit};
 use bevy::ecs::resource::Resource;
@@ -14,7 +14,7 @@ use bevy::platform::collections::HashMap;
 use bevy::tasks::futures::check_ready;
 use bevy::tasks::{AsyncComputeTaskPool, Task};
 
-/// The largest number of Gaussians, in all captures whose boxes a ray meets, that are searched at once: a fraction of a millisecond.
+/// Most Gaussians, in all captures whose boxes a ray meets, that are searched at once: a fraction of a millisecond.
 const AT_ONCE: usize = 1 << 14;
 
 /// The searches of all rays.

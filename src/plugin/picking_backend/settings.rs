@@ -29,8 +29,8 @@ use bevy::reflect::std_traits::ReflectDefault;
 #[reflect(Resource, Default, Debug, Clone, PartialEq)]
 #[type_path = "bevy_gs4d::picking_backend"]
 pub struct CapturePickingSettings {
-    /// Whether rays are cast only through cameras with a [`CapturePickingCamera`] and only at captures with Bevy's `Pickable`. Default:
-    /// false.
+    /// Whether rays are cast only through cameras with a [`CapturePickingCamera`] and only at captures with Bevy's
+    /// `Pickable`. Default: false.
     pub require_markers: bool,
 }
 

@@ -1,7 +1,7 @@
 //! One step of a playback.
 //!
-//! In: a [`Playback`] with the changes of the game, its [`PlaybackState`], and a [`Drive`]. Out: the playback after the step, whose time is
-//! drawn, and a [`Progress`] with the events of the step.
+//! In: a [`Playback`] with the changes of the game, its [`PlaybackState`], and a [`Drive`]. Out: the playback after the
+//! step, whose time is drawn, and a [`Progress`] with the events of the step.
 
 use super::component::Playback;
 use super::drive::Drive;
@@ -22,8 +22,8 @@ pub(super) struct Progress {
 }
 
 impl PlaybackState {
-    /// Advances a playback of a capture that lasts `duration` seconds by one step. Returns the playback after the step, and the events of
-    /// the step.
+    /// Advances a playback of a capture that lasts `duration` seconds by one step. Returns the playback after the step,
+    /// and the events of the step.
     pub(super) fn advance(&mut self, mut now: Playback, drive: Drive, duration: f32) -> (Playback, Progress) {
         let span = now.span(duration);
         let was_at_end = self.is_at_end_of_loop();

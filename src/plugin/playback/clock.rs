@@ -1,7 +1,7 @@
 //! Clocks that several captures share.
 //!
-//! In: the game's time, or seconds that the game sets from an audio player or the network. Out: a [`PlaybackClock`] that every
-//! [`Playback`](super::Playback) with [`FollowsClock`] follows, independent of when it was spawned or loaded.
+//! In: the game's time, or seconds that the game sets from an audio player or the network. Out: a [`PlaybackClock`]
+//! that every [`Playback`](super::Playback) with [`FollowsClock`] follows, whenever it was spawned or loaded.
 
 use bevy::ecs::component::Component;
 use bevy::ecs::entity::Entity;
@@ -35,14 +35,14 @@ use bevy::reflect::std_traits::ReflectDefault;
 pub struct PlaybackClock {
     /// The time of the clock, in seconds. Neither rounded nor wrapped: followers wrap it. Default: 0.
     pub seconds: f64,
-    /// Seconds of the clock per second of the game; negative runs backwards. Used with [`ClockSource::Game`] only. Default: 1.
+    /// Seconds of the clock per second of the game, for [`ClockSource::Game`]; negative runs backwards. Default: 1.
     pub speed: f32,
-    /// Whether the clock runs. Used with [`ClockSource::Game`] only. Default: true.
+    /// Whether the clock runs, for [`ClockSource::Game`]. Default: true.
     pub running: bool,
     /// The source of the clock's time. Default: [`ClockSource::Game`].
     pub source: ClockSource,
-    /// Number of the clock's jumps. When the number changes, followers [seek](super::PlaybackSeeked) to the clock's time; otherwise they
-    /// play the time in between, which crosses segment bounds and markers. Default: 0.
+    /// Number of the clock's jumps. When the number changes, followers [seek](super::PlaybackSeeked) to the clock's
+    /// time; otherwise they play the time in between, which crosses segment bounds and markers. Default: 0.
     pub jumps: u32,
 }
 
@@ -59,19 +59,19 @@ pub enum ClockSource {
     Manual,
 }
 
-/// Lets a [`Playback`](super::Playback) follow another entity: one with a [`PlaybackClock`], or any with a `Playback`, such as another
-/// capture or a [`TimelinePlayer`](super::TimelinePlayer).
+/// Lets a [`Playback`](super::Playback) follow another entity: one with a [`PlaybackClock`], or any with a `Playback`,
+/// such as another capture or a [`TimelinePlayer`](super::TimelinePlayer).
 ///
-/// The playback's time is then the clock's time multiplied by the playback's own `speed`, plus its `offset`, within its range and repeated as
-/// its `repeat` specifies; setting `time` has no effect. A paused follower keeps its time and continues at the clock's time when it plays
-/// again.
+/// The playback's time is then the clock's time multiplied by the playback's own `speed`, plus its `offset`, within its
+/// range and repeated as its `repeat` specifies; setting `time` has no effect. A paused follower keeps its time and
+/// continues at the clock's time when it plays again.
 ///
-/// The time of a followed `Playback` is its `time`; when that playback seeks or wraps, followers seek. A followed entity may itself follow
-/// another: followed entities advance before their followers. Only timelines that follow a capture show the capture's time of the frame
-/// before, because timelines advance before captures.
+/// The time of a followed `Playback` is its `time`; when that playback seeks or wraps, followers seek. A followed
+/// entity may itself follow another: followed entities advance before their followers. Only timelines that follow a
+/// capture show the capture's time of the frame before, because timelines advance before captures.
 ///
-/// If the other entity does not exist or has no time, or if entities follow each other in a circle, the follower's time does not advance,
-/// and the log has one warning.
+/// If the other entity does not exist or has no time, or if entities follow each other in a circle, the follower's time
+/// does not advance, and the log has one warning.
 ///
 /// # Examples
 ///
@@ -117,8 +117,8 @@ impl PlaybackClock {
         self.jumps = self.jumps.wrapping_add(1);
     }
 
-    /// Advances by `delta` seconds of the game's time, if the source is [`ClockSource::Game`] and the clock runs. A clock whose speed is not
-    /// finite does not advance.
+    /// Advances by `delta` seconds of the game's time, if the source is [`ClockSource::Game`] and the clock runs. A
+    /// clock whose speed is not finite does not advance.
     pub fn advance(&mut self, delta: f64) {
         let runs = match self.source {
             ClockSource::Game => self.running,

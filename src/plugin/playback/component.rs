@@ -13,11 +13,11 @@ use bevy::reflect::std_traits::ReflectDefault;
 /// How a capture or a timeline is played: on every [`GaussianCapture3d`](crate::GaussianCapture3d) and
 /// [`TimelinePlayer`](super::TimelinePlayer).
 ///
-/// Code may set any field at any time; animations may set any field but `repeat`. Setting `time` is a seek: the time between is
-/// skipped, not played. To slow down or to reverse, set `speed`.
+/// Code may set any field at any time; animations may set any field but `repeat`. Setting `time` is a seek: the time
+/// between is skipped, not played. To slow down or to reverse, set `speed`.
 ///
-/// Time begins with the first drawn frame: until a capture has been loaded and completely uploaded to the GPU, it stays at its first moment.
-/// Without a renderer, until it has been loaded.
+/// Time begins with the first drawn frame: until a capture has been loaded and completely uploaded to the GPU, it stays
+/// at its first moment. Without a renderer, until it has been loaded.
 ///
 /// # Examples
 ///
@@ -37,8 +37,8 @@ use bevy::reflect::std_traits::ReflectDefault;
 #[type_path = "bevy_gs4d::playback"]
 #[require(PlaybackState)]
 pub struct Playback {
-    /// Seconds since the capture's start. The plugin clamps the time to the range from `start` to `end`, unless the range is empty: seeking
-    /// beyond an end goes to that end. Default: 0.
+    /// Seconds since the capture's start. The plugin clamps the time to the range from `start` to `end`, unless the
+    /// range is empty: seeking beyond an end goes to that end. Default: 0.
     pub time: f32,
     /// Seconds of the capture per second of the clock; negative plays backwards. Default: 1.
     pub speed: f32,
@@ -48,12 +48,13 @@ pub struct Playback {
     pub repeat: Repeat,
     /// The in point: the first played moment, in seconds since the capture's start. Default: 0.
     pub start: f32,
-    /// The out point: the last played moment, in seconds since the capture's start, clamped to the capture's end. Time does not advance in
-    /// an empty range. Default: infinite.
+    /// The out point: the last played moment, in seconds since the capture's start, clamped to the capture's end. Time
+    /// does not advance in an empty range. Default: infinite.
     pub end: f32,
-    /// The position in the range when a [shared clock](super::FollowsClock) is at 0, and the position where [`replay`](Self::replay) begins:
-    /// seconds of the capture from the beginning of the range, in the direction of play. If negative, a follower with [`Repeat::Once`]
-    /// waits at the beginning until the clock reaches it, and `replay` begins at the beginning. Default: 0.
+    /// The position in the range when a [shared clock](super::FollowsClock) is at 0, and the position where
+    /// [`replay`](Self::replay) begins: seconds of the capture from the beginning of the range, in the direction of
+    /// play. If negative, a follower with [`Repeat::Once`] waits at the beginning until the clock reaches it, and
+    /// `replay` begins at the beginning. Default: 0.
     pub offset: f32,
     /// Whether [`Repeat::PingPong`] plays its returning pass; always false with other modes. Default: false.
     pub returning: bool,
@@ -108,8 +109,8 @@ impl Playback {
         Self { time: seconds, playing: false, ..Self::default() }
     }
 
-    /// Starts to play. A playback that has stopped at its end, or would stop there immediately, plays from the beginning, as with
-    /// [`replay`](Self::replay); a follower of a clock goes to the clock's time.
+    /// Starts to play. A playback that has stopped at its end, or would stop there immediately, plays from the
+    /// beginning, as with [`replay`](Self::replay); a follower of a clock goes to the clock's time.
     pub fn play(&mut self) {
         self.playing = true;
     }
@@ -134,8 +135,8 @@ impl Playback {
         self.speed = -self.speed;
     }
 
-    /// Plays from the beginning: from `offset` after the in point or, if `speed` is negative, backwards from `offset` before the out
-    /// point. Backwards, `offset` has no effect with the default out point, which is infinite.
+    /// Plays from the beginning: from `offset` after the in point or, if `speed` is negative, backwards from `offset`
+    /// before the out point. Backwards, `offset` has no effect with the default out point, which is infinite.
     pub fn replay(&mut self) {
         self.time = if self.speed < 0.0 { self.end - self.offset } else { self.start + self.offset };
         self.returning = false;

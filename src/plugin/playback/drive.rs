@@ -1,7 +1,8 @@
 //! The source of a playback's time: the game's time, or another entity that the playback follows.
 //!
-//! In: an entity's optional [`FollowsClock`], the times of the entities that can be followed, and Bevy's time. Out: the order in which
-//! players advance, each after the entity that it follows; a [`Drive`] for each player, and a warning for a player that cannot follow.
+//! In: an entity's optional [`FollowsClock`], the times of the entities that can be followed, and Bevy's time. Out: the
+//! order in which players advance, each after the entity that it follows; a [`Drive`] for each player, and a warning
+//! for a player that cannot follow.
 
 use super::clock::{FollowsClock, PlaybackClock};
 use super::component::Playback;
@@ -82,8 +83,8 @@ pub(super) struct Following<'w, 's> {
 }
 
 impl Following<'_, '_> {
-    /// Returns the players in an order in which each comes after the player that it follows, otherwise in the given order. Players that
-    /// follow in a circle come last.
+    /// Returns the players in an order in which each comes after the player that it follows, otherwise in the given
+    /// order. Players that follow in a circle come last.
     pub(super) fn order(&self, players: impl Iterator<Item = Entity>) -> Vec<Entity> {
         let mut order: Vec<(usize, Entity)> =
             players.map(|player| (self.distance(player).unwrap_or(usize::MAX), player)).collect();

@@ -1,6 +1,6 @@
 //! Markers: named times.
 //!
-//! In: the markers of a timeline, or [`Markers`] on a capture; a played stretch. Out: the markers on the stretch, in the order of play.
+//! In: the markers of a timeline or a capture; a played stretch. Out: the markers on the stretch, in the order of play.
 
 use super::span::Leg;
 use bevy::ecs::component::Component;
@@ -20,8 +20,8 @@ pub struct Marker {
 }
 
 /// Markers on one capture, without a timeline: each sends [`MarkerReached`](super::MarkerReached) when the capture's
-/// [`Playback`](super::Playback) plays across it, in any direction and with any [`Repeat`](super::Repeat). Seeks skip markers;
-/// a marker at exactly the sought time is reached once playback continues.
+/// [`Playback`](super::Playback) plays across it, in any direction and with any [`Repeat`](super::Repeat). Seeks skip
+/// markers; a marker at exactly the sought time is reached once playback continues.
 ///
 /// The markers may be in any order. A time outside of the played range, or NaN, is never reached. Default: no markers.
 ///

@@ -1,10 +1,10 @@
 //! The messages about playing.
 //!
-//! In: the events of a step of an entity. Out: each message in two ways: as a message for a `MessageReader`, and as an event on the entity
-//! for observers: `commands.entity(capture).observe(|ended: On<PlaybackEnded>| ..)`.
+//! In: the events of a step of an entity. Out: each message in two ways: as a message for a `MessageReader`, and as an
+//! event on the entity for observers: `commands.entity(capture).observe(|ended: On<PlaybackEnded>| ..)`.
 //!
-//! The entity has a [`Playback`](super::Playback): a capture or a [`TimelinePlayer`](super::TimelinePlayer). The events of one entity
-//! in one frame are triggered in this order: seeked, started, paused, segment bounds, markers, looped, ended.
+//! The entity is a capture or a [`TimelinePlayer`](super::TimelinePlayer). The events of one entity in one frame are
+//! triggered in this order: seeked, started, paused, segment bounds, markers, looped, ended.
 
 use super::advance::Progress;
 use super::markers::{Marker, crossed};
@@ -33,7 +33,7 @@ pub struct PlaybackStarted {
     pub entity: Entity,
 }
 
-/// An entity no longer plays because [`playing`](super::Playback::playing) was cleared. Reaching the end is [`PlaybackEnded`].
+/// An entity was paused: [`playing`](super::Playback::playing) was cleared. Reaching the end is [`PlaybackEnded`].
 ///
 /// # Examples
 ///
@@ -69,12 +69,13 @@ pub struct PlaybackSeeked {
     pub to: f32,
 }
 
-/// A bound between two segments of a capture's temporal filter, the start of the first segment or the end of the last one was crossed or
-/// reached while playing. These bounds are the filter's key-frames ([`GaussianCapture::key_frames`]); they are independent of the keyframes
-/// of an animation. For times that the game defines, put [`Markers`] on the capture.
+/// A bound between two segments of a capture's temporal filter, the start of the first segment or the end of the last
+/// one was crossed or reached while playing. These bounds are the filter's key-frames
+/// ([`GaussianCapture::key_frames`]); they are independent of the keyframes of an animation. For times that the game
+/// defines, put [`Markers`] on the capture.
 ///
-/// A bound at the time of a seek is crossed once playback continues. A step that is longer than four passes of a loop sends the bounds of
-/// two to four passes.
+/// A bound at the time of a seek is crossed once playback continues. A step that is longer than four passes of a loop
+/// sends the bounds of two to four passes.
 ///
 /// [`GaussianCapture::key_frames`]: crate::asset::GaussianCapture::key_frames
 /// [`Markers`]: super::Markers
@@ -103,8 +104,8 @@ pub struct SegmentBoundCrossed {
     pub time: f32,
 }
 
-/// A marker of a timeline, or of a capture with [`Markers`](super::Markers), was crossed or reached while playing. Seeks and long steps are
-/// treated as for [`SegmentBoundCrossed`].
+/// A marker of a timeline, or of a capture with [`Markers`](super::Markers), was crossed or reached while playing.
+/// Seeks and long steps are treated as for [`SegmentBoundCrossed`].
 ///
 /// # Examples
 ///

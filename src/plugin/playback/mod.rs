@@ -1,8 +1,9 @@
 //! Playback: the time of each capture.
 //!
-//! In: Bevy's [`Time`](bevy::time::Time) (the virtual clock: pausing and scaling it pauses and scales captures) and the values that a game
-//! sets on a [`Playback`], a shared [`PlaybackClock`] or a [`TimelinePlayer`]. Out: `Playback::time`, advanced once a frame in
-//! [`PlaybackSystems::Advance`], which the renderer reads; messages and observable events about playback.
+//! In: Bevy's [`Time`](bevy::time::Time) (the virtual clock: pausing and scaling it pauses and scales captures) and the
+//! values that a game sets on a [`Playback`], a shared [`PlaybackClock`] or a [`TimelinePlayer`]. Out:
+//! `Playback::time`, advanced once a frame in [`PlaybackSystems::Advance`], which the renderer reads; messages and
+//! observable events about playback.
 //!
 //! ```text
 //! Time ──▶ PlaybackClock ◀── audio, network            Clocks
@@ -14,12 +15,12 @@
 //!  Time ──────────────────────▶ Playback::time         Advance
 //! ```
 //!
-//! A playback can follow a clock or another player ([`FollowsClock`]). [`Markers`] are named times of one capture, like the markers of a
-//! timeline.
+//! A playback can follow a clock or another player ([`FollowsClock`]). [`Markers`] are named times of one capture, like
+//! the markers of a timeline.
 //!
-//! Bevy's own animations may animate any field of a [`Playback`] but `repeat` through `animated_field!(Playback::speed)`. They run in
-//! `PostUpdate`: a `time` set on a capture is drawn in the same frame; other fields, and all fields of a [`TimelinePlayer`]'s playback, take
-//! effect in the next frame.
+//! Bevy's own animations may animate any field of a [`Playback`] but `repeat` through
+//! `animated_field!(Playback::speed)`. They run in `PostUpdate`: a `time` set on a capture is drawn in the same frame;
+//! other fields, and all fields of a [`TimelinePlayer`]'s playback, take effect in the next frame.
 
 mod advance;
 mod clock;

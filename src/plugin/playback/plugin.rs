@@ -1,6 +1,6 @@
 //! The playback plugin: the order of its systems.
 //!
-//! In: an app with Bevy's `AssetPlugin` and `TimePlugin`. Out: the same app, in which clocks, timelines and captures advance.
+//! In: an app with Bevy's `AssetPlugin` and `TimePlugin`. Out: advancing clocks, timelines and captures.
 
 use super::clock::PlaybackClock;
 use super::component::Playback;
@@ -8,7 +8,7 @@ use super::messages::{
     MarkerReached, PlaybackEnded, PlaybackLooped, PlaybackPaused, PlaybackSeeked, PlaybackStarted, SegmentBoundCrossed,
 };
 use super::systems::{PlaybackSystems, advance_captures, run_clocks, warn_of_missing_handles};
-use super::timeline::{Timeline, TimelineLoader, TimelinePlayer, advance_timelines, bind_tracks, direct_tracks};
+use super::timeline::{Timeline, TimelineLoader, TimelinePlayer, advance_timelines, bind_tracks, update_tracks};
 use crate::plugin::asset::{set_up, set_up_late};
 use crate::plugin::component::GaussianCapture3d;
 use bevy::app::{App, Last, Plugin, Update};
@@ -19,8 +19,8 @@ use bevy::ecs::schedule::common_conditions::{any_match_filter, any_with_componen
 use bevy::log::warn;
 use bevy::time::Time;
 
-/// Plays captures and timelines. Part of [`GaussianCapturePlugins`](crate::GaussianCapturePlugins). Without it, captures show the time that
-/// the game sets in their [`Playback`].
+/// Plays captures and timelines. Part of [`GaussianCapturePlugins`](crate::GaussianCapturePlugins). Without it,
+/// captures show the time that the game sets in their [`Playback`].
 #[derive(Debug, Default, Clone, Copy)]
 pub struct CapturePlaybackPlugin;
 
@@ -58,7 +58,7 @@ fn add(app: &mut App) {
             Update,
             (
                 run_clocks.run_if(any_with_component::<PlaybackClock>).in_set(Clocks),
-                (bind_tracks, advance_timelines, direct_tracks)
+                (bind_tracks, advance_timelines, update_tracks)
                     .chain()
                     .run_if(any_with_component::<TimelinePlayer>)
                     .in_set(Timelines),
@@ -71,7 +71,7 @@ fn add(app: &mut App) {
 
 /// Makes [`Playback`] a required component of captures: it has the time that is played, and the time that is drawn.
 pub(crate) fn require_playback(app: &mut App) {
-    // The other of the two plugins that need it may have registered it before.
+    // `CapturePlaybackPlugin` and `CaptureRenderPlugin` both register it: an error says that the other did.
     let _ = app.try_register_required_components::<GaussianCapture3d, Playback>();
 }
 

@@ -1,7 +1,8 @@
 //! The arithmetic of playback: a range of time that is played once, in a loop, or ping-pong.
 //!
-//! In: a range and two phases. A phase is the time played since the in point, in seconds, without wrapping; a pass is one run through the
-//! range. Out: the time at a phase, and a [`Travel`]: all stretches of the capture between the two phases, in order.
+//! In: a range and two phases. A phase is the time played since the in point, in seconds, without wrapping; a pass is
+//! one run through the range. Out: the time at a phase, and a [`Travel`]: all stretches of the capture between the two
+//! phases, in order.
 
 use super::repeat::Repeat;
 
@@ -42,8 +43,8 @@ pub(super) struct Leg {
 }
 
 impl Span {
-    /// Returns the range from `start` to `end` of a capture that lasts `duration` seconds. Both are clamped to the capture; a NaN start counts
-    /// as 0, a NaN end as the duration.
+    /// Returns the range from `start` to `end` of a capture that lasts `duration` seconds. Both are clamped to the
+    /// capture; a NaN start counts as 0, a NaN end as the duration.
     pub(super) fn new([start, end]: [f32; 2], repeat: Repeat, duration: f32) -> Self {
         let duration = if duration.is_finite() { f64::from(duration.max(0.0)) } else { 0.0 };
         let bound = |value: f32, otherwise: f64| {
@@ -83,8 +84,8 @@ impl Span {
         self.start + self.length
     }
 
-    /// Returns the phase of `time` in the first pass or, of a ping-pong range, in the first two passes. Times outside of the range are
-    /// clamped.
+    /// Returns the phase of `time` in the first pass or, of a ping-pong range, in the first two passes. Times outside
+    /// of the range are clamped.
     pub(super) fn phase(&self, time: f32, returning: bool) -> f64 {
         let into = (f64::from(time) - self.start).clamp(0.0, self.length);
         if self.repeat.turns_round() && returning { 2.0 * self.length - into } else { into }
@@ -96,8 +97,8 @@ impl Span {
         if speed < 0.0 { self.length - offset + speed * seconds } else { offset + speed * seconds }
     }
 
-    /// Returns the time at a phase of the first pass (ping-pong: the first two): seconds since the capture's start, unrounded. The end of a
-    /// loop is its start.
+    /// Returns the time at a phase of the first pass (ping-pong: the first two): seconds since the capture's start,
+    /// unrounded. The end of a loop is its start.
     pub(super) fn exact(&self, phase: f64) -> f64 {
         if self.repeat.wraps() && phase >= self.length {
             return self.start;
@@ -118,8 +119,8 @@ impl Span {
         self.repeat.stops() && if forward { phase >= self.length } else { phase <= 0.0 }
     }
 
-    /// Returns the stretches between two finite phases. With `fresh`, the moment at `from` counts as passed. Arriving at an end counts as a
-    /// turn, leaving it does not.
+    /// Returns the stretches between two finite phases. With `fresh`, the moment at `from` counts as passed. Arriving
+    /// at an end counts as a turn, leaving it does not.
     pub(super) fn travel(&self, from: f64, to: f64, fresh: bool) -> Travel {
         let (forward, length, distance) = (to >= from, self.length, to - from);
         let pass = |phase: f64| match (self.repeat, forward) {
@@ -155,8 +156,8 @@ impl Travel {
         if self.is_returning(self.last) { self.span.length + into } else { into }
     }
 
-    /// Returns the stretches, in the order of play. A step longer than four passes returns the stretches of two to four passes. The end of a
-    /// loop at which the step began may come first, as a stretch of length 0.
+    /// Returns the stretches, in the order of play. A step longer than four passes returns the stretches of two to four
+    /// passes. The end of a loop at which the step began may come first, as a stretch of length 0.
     pub(super) fn legs(&self) -> impl Iterator<Item = Leg> {
         let count = (self.last - self.first).abs() as u32;
         let direction = (self.last - self.first).signum();
@@ -172,8 +173,8 @@ impl Travel {
         self.left().map(|at| Leg { from: at, to: at, inclusive: true }).into_iter().chain(stretches)
     }
 
-    /// Returns the end of a loop at which the step began, in seconds since the capture's start, if this end counts as passed. No stretch
-    /// contains it, because the first stretch begins at the other end.
+    /// Returns the end of a loop at which the step began, in seconds since the capture's start, if this end counts as
+    /// passed. No stretch contains it, because the first stretch begins at the other end.
     fn left(&self) -> Option<f64> {
         let (phase, end) = if self.is_forward() { (self.span.length, self.span.end()) } else { (0.0, self.span.start) };
         (self.inclusive && self.span.repeat.wraps() && self.from == phase).then_some(end)

@@ -1,6 +1,6 @@
 //! The state of a playback from frame to frame.
 //!
-//! In: the result of a step of [`advance`](super::advance). Out: a [`PlaybackState`], from which the next step continues.
+//! In: the result of a step of [`advance`](super::advance). Out: a [`PlaybackState`], for the next step.
 
 use super::span::Span;
 use bevy::asset::UntypedAssetId;
@@ -16,7 +16,7 @@ pub(super) struct PlaybackState {
     pub(super) phase: f64,
     /// The range to which `phase` belongs; `None` before the first step.
     pub(super) span: Option<Span>,
-    /// `time`, `returning` and `playing` of the playback after the last step: if the playback's fields differ, the game has set them.
+    /// `time`, `returning` and `playing` of the playback after the last step: other values have been set by the game.
     pub(super) time: f32,
     pub(super) returning: bool,
     pub(super) playing: bool,
@@ -32,7 +32,7 @@ pub(super) struct PlaybackState {
     pub(super) warned_of: Option<Entity>,
 }
 
-/// A step along a shared clock. While all fields except `phase` stay the same, time elapses; a change of another field is a jump.
+/// A step along a shared clock. A change of `phase` alone is elapsed time, a change of another field is a jump.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Follow {
     pub(super) clock: Entity,
@@ -43,7 +43,7 @@ pub(super) struct Follow {
 }
 
 impl PlaybackState {
-    /// Returns the state before the first step of another asset on the same entity. Its first step is a jump for followers.
+    /// Returns the state before the first step, which is a jump for followers, of another asset on the same entity.
     pub(super) fn restarted(&self) -> Self {
         Self { jumps: self.jumps, warned_of: self.warned_of, ..Self::default() }
     }

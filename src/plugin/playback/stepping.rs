@@ -9,11 +9,11 @@ use super::span::Span;
 use super::state::PlaybackState;
 
 impl Playback {
-    /// Pauses, and goes `frames` forward (negative: back) in a capture that lasts `duration` seconds: from the nearest frame to a frame that
-    /// begins at exactly a whole number of `1 / fps` seconds since the capture's start.
+    /// Pauses, and goes `frames` forward (negative: back) in a capture that lasts `duration` seconds: from the nearest
+    /// frame to a frame that begins at exactly a whole number of `1 / fps` seconds since the capture's start.
     ///
-    /// Frames stay in the range and continue at its ends as `repeat` specifies. The same number of steps back ends at bitwise the same time.
-    /// If the range contains no frame, or `fps` is not a positive number, this only pauses.
+    /// Frames stay in the range and continue at its ends as `repeat` specifies. The same number of steps back ends at
+    /// bitwise the same time. If the range contains no frame, or `fps` is not a positive number, this only pauses.
     pub fn step(&mut self, frames: i32, fps: f32, duration: f32) {
         self.pause();
         let span = self.span(duration);
@@ -23,25 +23,26 @@ impl Playback {
         }
     }
 
-    /// Advances by `delta` seconds of the clock in a capture that lasts `duration` seconds. The plugin does this for every
-    /// entity; call it only for captures that are played without the plugin.
+    /// Advances by `delta` seconds of the clock in a capture that lasts `duration` seconds. The plugin does this for
+    /// every entity; call it only for captures that are played without the plugin.
     ///
-    /// With [`Repeat::Loop`] the time stays below the out point, because the end of a loop is its start. [`Repeat::Once`] stops exactly at the
-    /// end (backwards: at the start) and pauses. Without the plugin, [`play`](Self::play) at that end stops there again: call
-    /// [`replay`](Self::replay). A still (duration 0 or less) and a `delta` that is not finite change nothing.
+    /// With [`Repeat::Loop`] the time stays below the out point, because the end of a loop is its start.
+    /// [`Repeat::Once`] stops exactly at the end (backwards: at the start) and pauses. Without the plugin,
+    /// [`play`](Self::play) at that end stops there again: call [`replay`](Self::replay). A still (duration 0 or less)
+    /// and a `delta` that is not finite change nothing.
     pub fn advance(&mut self, delta: f32, duration: f32) {
         let mut state = PlaybackState { playing: self.playing, ..PlaybackState::default() };
         (*self, _) = state.advance(*self, Drive::By(delta.into()), duration);
     }
 }
 
-/// Tolerance within which frames coincide, in frames: smaller than an intended difference, larger than the rounding error.
+/// Tolerance within which frames coincide, in frames: below an intended difference, above the rounding error.
 const FRAME_SLACK: f64 = 1e-3;
 /// Largest number of a frame at which frames can still be distinguished.
 const MOST_FRAMES: f64 = 1e12;
 
-/// Returns the time of the frame `frames` after the frame nearest to `time`, as [`Playback::step`] describes, and whether its pass returns;
-/// `None` if the range contains no frame.
+/// Returns the time of the frame `frames` after the frame nearest to `time`, as [`Playback::step`] describes, and
+/// whether its pass returns; `None` if the range contains no frame.
 fn frame_after(span: &Span, time: f32, returning: bool, frames: i32, fps: f32) -> Option<(f32, bool)> {
     let fps = f64::from(fps);
     let (low, high) = (span.start() * fps, span.end() * fps);

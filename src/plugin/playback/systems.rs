@@ -1,7 +1,7 @@
 //! The systems that advance clocks and captures.
 //!
-//! In: Bevy's time, shared clocks, and the duration of each loaded capture. Out: [`Playback::time`] of every entity with a capture,
-//! and messages about playback; a warning for each entity without the handle of a capture.
+//! In: Bevy's time, shared clocks, and the duration of each loaded capture. Out: [`Playback::time`] of every entity
+//! with a capture, and messages about playback; a warning for each entity without the handle of a capture.
 
 use super::clock::PlaybackClock;
 use super::component::Playback;
@@ -29,8 +29,8 @@ pub enum PlaybackSystems {
     Clocks,
     /// Timelines advance and set up their tracks.
     Timelines,
-    /// Captures advance. Systems `.before` this set can change the speed; systems `.after` it read the time that will be drawn, and may still
-    /// change it.
+    /// Captures advance. Systems `.before` this set can change the speed; systems `.after` it read the time that will
+    /// be drawn, and may still change it.
     Advance,
 }
 
@@ -44,8 +44,8 @@ pub(super) fn run_clocks(time: Res<Time>, mut clocks: Query<&mut PlaybackClock>)
     }
 }
 
-/// Advances the playback of every loaded capture, followed captures before their followers. No time passes before the first drawn frame of a
-/// capture.
+/// Advances the playback of every loaded capture, followed captures before their followers. No time passes before the
+/// first drawn frame of a capture.
 pub(super) fn advance_captures(
     time: Res<Time>,
     captures: Res<Assets<GaussianCapture>>,
@@ -100,8 +100,8 @@ pub(super) fn warn_of_missing_handles(
 ) {
     for entity in without_handle(&captures, &changed) {
         warn!(
-            "{entity} has a GaussianCapture3d with the default handle, which has no asset, so that nothing is drawn: set the \
-             handle that AssetServer::load or Assets::add returns"
+            "{entity} has a GaussianCapture3d with the default handle, which has no asset, so that nothing is drawn: \
+             set the handle that AssetServer::load or Assets::add returns"
         );
     }
 }

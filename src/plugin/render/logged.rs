@@ -1,6 +1,6 @@
 //! Failures in the log: each different message once.
 //!
-//! In: the message of a failure, in every frame in which it occurs. Out: one line in the log for each different message.
+//! In: the message of a failure, in every frame in which it occurs. Out: one line in the log.
 
 use bevy::log::{error, warn};
 use std::collections::HashSet;
@@ -13,7 +13,7 @@ static LOGGED: Mutex<Logged> = Mutex::new(Logged(None));
 struct Logged(Option<HashSet<String>>);
 
 impl Logged {
-    /// Number of messages after which no other message is logged: messages may contain a size that changes in every frame.
+    /// Most messages that are logged: messages may contain a size that changes in every frame.
     const MOST: usize = 64;
 
     /// Records a message. Returns whether it must be logged.

@@ -2,30 +2,32 @@
 //!
 //! In: an app in which captures load and play. Out: the same app; captures are drawn if it has a renderer.
 
-use super::active::{ActiveLists, any_stale, prepare_active_lists, record_active_lists};
-use super::capture_views::{CaptureViews, any_shaded};
-use super::checked_pipelines::CheckedPipelines;
-use super::composite::{CaptureShaders, CompositePipeline};
-use super::depth_readers::{DepthReaders, extract_depth_readers};
-use super::detail::{CaptureDetail, CaptureLevels, any_levels, choose_levels, extract_detail};
-use super::draw::{CaptureSystems, draw_captures, draw_front, record_captures};
-use super::extract::{
+use super::captures::active::{ActiveLists, any_stale, prepare_active_lists, record_active_lists};
+use super::captures::back_off::BackOff;
+use super::captures::detail::{CaptureDetail, CaptureLevels, any_levels, choose_levels, extract_detail};
+use super::captures::extract::{
     ExtractedCaptures, ExtractedViewSettings, any_view_settings, extract_captures, extract_view_settings, has_changed,
 };
-use super::order::{
+use super::captures::previous::PreviousCaptures;
+use super::captures::upload::{
+    CaptureUploadBudget, GpuGaussianCapture, any_uploading, continue_uploads, extract_upload_budget,
+};
+use super::captures::visibility::update_bounds;
+use super::renderer::init_renderer;
+use super::settings::CaptureSettings;
+use super::statistics::CaptureStatistics;
+use super::targets::checked_pipelines::CheckedPipelines;
+use super::targets::composite::{CaptureShaders, CompositePipeline};
+use super::targets::depth_readers::{DepthReaders, extract_depth_readers};
+use super::targets::write_depth::WriteDepthPipeline;
+use super::targets::write_motion::WriteMotionPipeline;
+use super::views::capture_views::{CaptureViews, any_shaded};
+use super::views::draw::{CaptureSystems, draw_captures, draw_front, record_captures};
+use super::views::order::{
     CaptureOrders, OtherPasses, any_early, any_front, any_ordered, hide_front, place_captures, show_front,
 };
-use super::prepare::{make_depth_readable, prepare_views};
-use super::previous::PreviousCaptures;
-use super::renderer::init_renderer;
-use super::rests::Rests;
-use super::settings::CaptureSettings;
-use super::shade_requests::ShadeRequests;
-use super::statistics::CaptureStatistics;
-use super::upload::{CaptureUploadBudget, GpuGaussianCapture, any_uploading, continue_uploads, extract_upload_budget};
-use super::visibility::update_bounds;
-use super::write_depth::WriteDepthPipeline;
-use super::write_motion::WriteMotionPipeline;
+use super::views::prepare::{make_depth_readable, prepare_views};
+use super::views::shade_requests::ShadeRequests;
 use crate::plugin::asset::{Uploads, set_up, set_up_late};
 use crate::plugin::component::GaussianCapture3d;
 use crate::plugin::playback::require_playback;
@@ -43,8 +45,8 @@ use bevy::render::renderer::{RenderGraph, RenderGraphSystems};
 use bevy::render::{ExtractSchedule, GpuResourceAppExt, Render, RenderApp, RenderStartup, RenderSystems};
 use bevy::shader::Shader;
 
-/// Draws captures. Part of [`GaussianCapturePlugins`](crate::GaussianCapturePlugins). Without it, or without a renderer, captures are ready
-/// once they have been loaded.
+/// Draws captures. Part of [`GaussianCapturePlugins`](crate::GaussianCapturePlugins). Without it, or without a
+/// renderer, captures are ready once they have been loaded.
 #[derive(Debug, Default, Clone, Copy)]
 pub struct CaptureRenderPlugin;
 
@@ -59,8 +61,9 @@ impl Plugin for CaptureRenderPlugin {
         let draws = app.get_sub_app(RenderApp).is_none_or(has_captures);
         if !draws && app.world().contains_resource::<Uploads>() {
             warn!(
-                "Bevy's RenderPlugin was added after GaussianCapturePlugins, which were set up to draw only when the app started: add \
-                 GaussianCapturePlugins after DefaultPlugins or, in an app without them, after RenderPlugin"
+                "Bevy's RenderPlugin was added after GaussianCapturePlugins, which were set up to draw only when the \
+                 app started: add GaussianCapturePlugins after DefaultPlugins or, in an app without them, after \
+                 RenderPlugin"
             );
             build_rendering(app);
         }
@@ -117,7 +120,7 @@ fn build_rendering(app: &mut App) {
         .init_gpu_resource::<WriteMotionPipeline>()
         .init_gpu_resource::<CheckedPipelines<WriteMotionPipeline>>()
         .init_gpu_resource::<CaptureViews>()
-        .init_gpu_resource::<Rests<Entity>>()
+        .init_gpu_resource::<BackOff<Entity>>()
         .init_gpu_resource::<ActiveLists>()
         .add_systems(RenderStartup, init_renderer)
         .add_systems(
@@ -162,7 +165,7 @@ fn build_rendering(app: &mut App) {
                 .before(CaptureSystems::DrawLate)
                 .in_set(Core3dSystems::MainPass),
         )
-        // Most cameras need one of these systems. An idle system costs more than its condition, since another thread may have to wake up.
+        // Most cameras need one of these systems. An idle system may wake a thread, and costs more than its condition.
         .add_systems(
             Core3d,
             (
@@ -183,7 +186,7 @@ fn build_rendering(app: &mut App) {
                 (show_front.run_if(any_front), draw_captures::<true>, draw_front.run_if(any_front))
                     .chain()
                     .after(main_transparent_pass_3d)
-                    // It draws over all other transparent items.
+                    // The resolve draws over all other transparent items.
                     .before(oit_resolve)
                     .in_set(CaptureSystems::DrawLate),
             )

@@ -1,7 +1,7 @@
 //! Reflection for the enums of [`crate::view`] and [`crate::renderer`], which do not use Bevy.
 //!
-//! In: [`BlendSpace`], [`DebugView`] and [`Design`]. Out: `Reflect` for each, so that components that contain them can be saved, inspected
-//! and animated.
+//! In: [`BlendSpace`], [`DebugView`] and [`Design`]. Out: `Reflect` for each, so that components that contain them can
+//! be saved, inspected and animated.
 
 use crate::renderer::Design;
 use crate::view::{BlendSpace, DebugView};

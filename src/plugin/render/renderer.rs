@@ -1,10 +1,10 @@
 //! The renderer's pipelines, as a resource of the render world.
 //!
-//! In: Bevy's render device, once when rendering starts and again after a lost device. Out: [`CaptureRenderer`], or the reason for its
-//! absence in [`CaptureStatistics`].
+//! In: Bevy's render device, once when rendering starts and again after a lost device. Out: [`CaptureRenderer`], or the
+//! reason for its absence in [`CaptureStatistics`].
 
 use super::statistics::CaptureStatistics;
-use crate::renderer::memory::catch_known;
+use crate::renderer::device::memory::catch_known;
 use crate::renderer::{Renderer, ShaderChecks};
 use bevy::ecs::resource::Resource;
 use bevy::ecs::system::{Commands, Res};

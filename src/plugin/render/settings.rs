@@ -1,6 +1,6 @@
 //! Settings of drawing, per capture and per camera.
 //!
-//! In: fields that any system or animation may set. Out: an [`Appearance`] for the renderer, and the settings of a camera.
+//! In: fields that any system or animation may set. Out: an [`Appearance`] for the renderer, the settings of a camera.
 
 use crate::renderer::Design;
 use crate::view::{Appearance, BlendSpace, DebugView};
@@ -33,8 +33,8 @@ use glam::{Affine3A, Mat3, Quat, Vec3};
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
 #[type_path = "bevy_gs4d::render"]
 pub struct CaptureSettings {
-    /// Whether the capture's temporal filter is used, if it has one: Gaussians that are not active in the current segment are then
-    /// skipped. Default: true.
+    /// Whether the capture's temporal filter is used, if it has one: Gaussians that are not active in the current
+    /// segment are then skipped. Default: true.
     pub filter: bool,
     /// Factor on every Gaussian's opacity, from 0 (invisible) to 1. A timeline's fade is a further factor. Default: 1.
     pub opacity: f32,
@@ -44,12 +44,13 @@ pub struct CaptureSettings {
     pub exposure: f32,
     /// The part of the capture that is drawn. Default: `None`, all of it.
     pub crop: Option<CropBox>,
-    /// The finest level of detail that is drawn, if the capture has levels: 0 is all Gaussians, 1 the first level with fewer Gaussians; a
-    /// number above the coarsest level selects the coarsest. Default: 0.
+    /// The finest level of detail that is drawn, if the capture has levels: 0 is all Gaussians, 1 the first level with
+    /// fewer Gaussians; a number above the coarsest level selects the coarsest. Default: 0.
     pub finest_level: u8,
-    /// Whether Gaussians are made fainter where they are smaller on the screen than in training, so that they cover no more than in
-    /// training; without it, distant Gaussians appear too large. Needs the size of training pixels, which `gs4d bake` and
-    /// `gs4d detail --data` write into the package; shadows and captures without it are drawn without anti-aliasing. Default: true.
+    /// Whether Gaussians are anti-aliased: where they are smaller on the screen than in training, they are drawn
+    /// fainter, so that they cover no more than in training. Without anti-aliasing, distant Gaussians appear too large.
+    /// Needs the size of training pixels, which `gs4d bake` and `gs4d detail --data` write into the package; captures
+    /// without this size, and shadows, are drawn without anti-aliasing. Default: true.
     pub antialias: bool,
 }
 
@@ -75,9 +76,9 @@ pub struct CaptureSettings {
 pub struct CropBox {
     /// Center of the box. Default: the origin.
     pub center: Vec3,
-    /// Half the lengths of its sides. An infinite length does not crop; a negative length counts as 0. Default: 1 on each axis.
+    /// Half the lengths of the sides. An infinite length does not crop; a negative length counts as 0. Default: 1.
     pub half_size: Vec3,
-    /// Its rotation about its center. Default: none.
+    /// Rotation of the box about its center. Default: none.
     pub rotation: Quat,
 }
 
@@ -100,9 +101,10 @@ pub struct CropBox {
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
 #[type_path = "bevy_gs4d::render"]
 pub struct CaptureViewSettings {
-    /// The space in which Gaussians are blended with each other and with the background. Default: [`BlendSpace::Encoded`], as trained.
+    /// The space in which Gaussians are blended with each other and with the background. Default:
+    /// [`BlendSpace::Encoded`], as trained.
     pub blend_space: BlendSpace,
-    /// Which depth of captures is written to the camera's depth buffer. Default: [`DepthWrite::Auto`], a depth only if an effect reads it.
+    /// The depth of captures in the camera's depth buffer. Default: [`DepthWrite::Auto`], only if an effect reads it.
     pub depth: DepthWrite,
     /// The quantity that is shown. Default: [`DebugView::Color`].
     pub debug: DebugView,
@@ -110,11 +112,12 @@ pub struct CaptureViewSettings {
     pub design: Design,
 }
 
-/// Which depth of captures is written to the camera's depth buffer, at pixels where they hide more than half of the background.
+/// The depth of captures in the camera's depth buffer, at pixels where they hide more than half of the background.
 ///
 /// Post-processing that reads the depth buffer (depth of field, volumetric fog) then treats captures as surfaces. With
-/// [`Expected`](Self::Expected) and [`Median`](Self::Median), transparent meshes are drawn after captures and depth-tested against them per
-/// pixel. See [the order of a frame](crate::render#the-order-of-a-frame). Default: [`Auto`](Self::Auto).
+/// [`Expected`](Self::Expected) and [`Median`](Self::Median), transparent meshes are drawn after captures and
+/// depth-tested against them per pixel. See [the order of a frame](crate::render#the-order-of-a-frame). Default:
+/// [`Auto`](Self::Auto).
 ///
 /// # Examples
 ///
@@ -134,15 +137,17 @@ pub struct CaptureViewSettings {
 #[type_path = "bevy_gs4d::render"]
 #[non_exhaustive]
 pub enum DepthWrite {
-    /// [`Expected`](Self::Expected) for cameras with one of Bevy's effects that read depths after the main pass, [`None`](Self::None) for
-    /// others. These effects are `DepthOfField`, `VolumetricFog`, `OrderIndependentTransparencySettings`, and all effects with a
-    /// `MotionVectorPrepass`: `TemporalAntiAliasing`, `MotionBlur`. A game with its own depth effect must set the depth.
+    /// [`Expected`](Self::Expected) for cameras with one of Bevy's effects that read depths after the main pass,
+    /// [`None`](Self::None) for others. These effects are `DepthOfField`, `VolumetricFog`,
+    /// `OrderIndependentTransparencySettings`, and all effects with a `MotionVectorPrepass`: `TemporalAntiAliasing`,
+    /// `MotionBlur`. A game with its own depth effect must set the depth.
     #[default]
     Auto,
     /// No depth is written.
     None,
-    /// The mean depth of the splats at a pixel, with the weights of their colors: smooth, but between surfaces where several surfaces are
-    /// visible. For captures with an environment map, and with [`DebugView::Overdraw`], the median is written instead.
+    /// The mean depth of the splats at a pixel, with the weights of their colors: smooth, but between surfaces where
+    /// several surfaces are visible. For captures with an environment map, and with [`DebugView::Overdraw`], the median
+    /// is written instead.
     Expected,
     /// The depth at which half of the light is absorbed: always on a surface, but with discontinuities.
     Median,
@@ -182,8 +187,7 @@ impl CropBox {
         self.cube_from_capture().is_none_or(|cube| cube.transform_point3(point).abs().max_element() <= 1.0)
     }
 
-    /// Returns the transform from capture space to the cube from −1 to 1; `None` if the box has no finite center or
-    /// rotation.
+    /// Returns the transform from capture space to the cube from −1 to 1; `None` without a finite center and rotation.
     fn cube_from_capture(&self) -> Option<Affine3A> {
         // A side of length 0 must not divide by zero.
         let scale = self.half_size.max(Vec3::splat(1e-12)).recip();
@@ -247,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn negative_sides_are_empty_and_invalid_boxes_crop_nothing() {
+    fn boxes_with_negative_sides_are_empty_and_invalid_boxes_crop_nothing() {
         let empty = CropBox { half_size: Vec3::new(1.0, -1.0, 1.0), ..CropBox::default() };
         assert!(!empty.contains(Vec3::Y * 0.1), "a box with a negative side contains no point");
         let broken = CropBox { center: Vec3::NAN, ..CropBox::default() };

@@ -49,8 +49,8 @@ struct Shared {
 }
 
 impl CaptureStatistics {
-    /// Starts or stops measuring the GPU time of each pass. The first times arrive some frames later; on a GPU without timestamps no times
-    /// arrive. The inspector also measures while it shows these times. Default: not measured.
+    /// Starts or stops measuring the GPU time of each pass. The first times arrive some frames later; on a GPU without
+    /// timestamps no times arrive. The inspector also measures while it shows these times. Default: not measured.
     pub fn measure(&self, on: bool) {
         self.lock().measure = on;
     }
@@ -67,8 +67,7 @@ impl CaptureStatistics {
         self.lock().views.iter().find(|(entity, _)| *entity == camera).map(|(_, statistics)| statistics.clone())
     }
 
-    /// Returns the statistics of every camera that sees a capture or holds memory for captures, by its entity in the
-    /// main world.
+    /// Returns the statistics of every camera that sees a capture or holds memory for captures, by main-world entity.
     pub fn views(&self) -> Vec<(Entity, ViewStatistics)> {
         self.lock().views.clone()
     }
@@ -83,12 +82,12 @@ impl CaptureStatistics {
         self.lock().uploaded_captures
     }
 
-    /// Returns the number of captures that are being uploaded to the GPU, including captures of which an older version is drawn.
+    /// Returns the number of captures that are being uploaded, including those of which an older version is drawn.
     pub fn uploading_captures(&self) -> usize {
         self.lock().uploading_captures
     }
 
-    /// Returns the counters of objects created, bytes uploaded and work recorded on the GPU so far. Clones share the counters.
+    /// Returns the counters of objects created, bytes uploaded and work recorded on the GPU, shared by clones.
     pub fn work(&self) -> WorkCounters {
         self.lock().work.clone()
     }
@@ -107,8 +106,8 @@ impl CaptureStatistics {
         shared.measure || shared.measure_for_panel
     }
 
-    /// Replaces the numbers by the numbers of a new frame: the statistics of each camera that sees captures or holds memory for them, the
-    /// bytes and count of all uploaded captures, and the count of captures that are being uploaded.
+    /// Replaces the numbers by those of a new frame: the statistics of each camera that sees captures or holds memory
+    /// for them, the bytes and count of all uploaded captures, and the count of captures being uploaded.
     pub(super) fn update<'a>(
         &self,
         views: impl Iterator<Item = (Entity, Cow<'a, ViewStatistics>)> + Clone,

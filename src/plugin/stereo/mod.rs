@@ -1,11 +1,12 @@
 //! Stereo: a head with two eyes, for side-by-side views and for pairs of pictures.
 //!
-//! In: a [`StereoRig`] on the head's entity, and the targets of its eyes ([`EyeTargets`]). Out: two cameras, children of the head, at the
-//! given distance and, for side-by-side views, each with its half of the target. Captures need no special support for stereo: each eye is
-//! an ordinary camera, and all work that does not depend on the camera (time, active Gaussians) is done once for all cameras.
+//! In: a [`StereoRig`] on the head's entity, and the targets of its eyes ([`EyeTargets`]). Out: two cameras, children
+//! of the head, at the given distance and, for side-by-side views, each with its half of the target. Captures need no
+//! special support for stereo: each eye is an ordinary camera, and all work that does not depend on the camera (time,
+//! active Gaussians) is done once for all cameras.
 //!
-//! Both eyes look straight ahead through symmetric frusta, so that distant points are at the same place in both pictures. A point
-//! at depth `z` is `focal length · ipd / z` pixels further right in the picture of the left eye.
+//! Both eyes look straight ahead through symmetric frusta, so that distant points are at the same place in both
+//! pictures. A point at depth `z` is `focal length · ipd / z` pixels further right in the picture of the left eye.
 //!
 //! ```no_run
 //! use bevy::camera::RenderTarget;

@@ -1,6 +1,6 @@
 //! The plugin of stereo: updates the positions and viewports of eyes.
 //!
-//! In: rigs, and the sizes of the eyes' targets. Out: the eyes' transforms, viewports and aspect ratios, updated in the frame of a change.
+//! In: rigs, and the sizes of the eyes' targets. Out: the eyes' transforms, viewports and aspects, in the same frame.
 
 use super::rig::{Eye, SideBySide, StereoRig};
 use bevy::app::{App, Plugin, PostUpdate};
@@ -16,8 +16,8 @@ use bevy::transform::TransformSystems;
 use bevy::transform::components::Transform;
 use glam::UVec2;
 
-/// Keeps the eyes of every [`StereoRig`] at their distance, and [side-by-side](SideBySide) eyes in their halves of the target. Part of
-/// [`GaussianCapturePlugins`](crate::GaussianCapturePlugins); adding it again has no effect.
+/// Keeps the eyes of every [`StereoRig`] at their distance, and [side-by-side](SideBySide) eyes in their halves of the
+/// target. Part of [`GaussianCapturePlugins`](crate::GaussianCapturePlugins); adding it again has no effect.
 ///
 /// # Examples
 ///
@@ -64,8 +64,8 @@ fn place_eyes(rigs: Query<(&StereoRig, &Children)>, mut eyes: Query<(&Eye, &mut 
     }
 }
 
-/// Sets the viewports. Runs after Bevy has updated the target's size, and updates the projection of a changed viewport, which Bevy would do
-/// one frame later.
+/// Sets the viewports. Runs after Bevy has updated the target's size, and updates the projection of a changed viewport,
+/// which Bevy would do one frame later.
 fn fit_eyes(mut eyes: Query<(&Eye, &mut Camera, &mut Projection), With<SideBySide>>) {
     for (eye, mut camera, mut projection) in &mut eyes {
         let Some((corner, size)) = camera.physical_target_size().and_then(|target| half(*eye, target)) else {

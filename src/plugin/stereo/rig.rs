@@ -14,8 +14,8 @@ use bevy::reflect::Reflect;
 use bevy::reflect::std_traits::ReflectDefault;
 use bevy::transform::components::Transform;
 
-/// A head. [`StereoPlugin`](super::StereoPlugin) places its children with an [`Eye`] on both sides of it; the game sets the transform of the
-/// head.
+/// A head. [`StereoPlugin`](super::StereoPlugin) places its children with an [`Eye`] on both sides of it; the game sets
+/// the transform of the head.
 ///
 /// # Examples
 ///
@@ -34,8 +34,8 @@ use bevy::transform::components::Transform;
 #[type_path = "bevy_gs4d::stereo"]
 #[require(Transform, Visibility)]
 pub struct StereoRig {
-    /// Distance between the eyes in world units, which are meters for a true sense of size. With 0 both eyes see the same picture; a value
-    /// that is not finite does not move the eyes. Default: 0.064, the mean of adults.
+    /// Distance between the eyes in world units, which are meters for a true sense of size. With 0 both eyes see the
+    /// same picture; a value that is not finite does not move the eyes. Default: 0.064, the mean of adults.
     pub ipd: f32,
 }
 
@@ -84,7 +84,8 @@ impl Eye {
     /// Both eyes, the left one first.
     pub const BOTH: [Self; 2] = [Self::Left, Self::Right];
 
-    /// Returns −1 for the left eye and +1 for the right eye: its position on the head's x axis, in halves of the distance between the eyes.
+    /// Returns −1 for the left eye and +1 for the right eye: its position on the head's x axis, in halves of the
+    /// distance between the eyes.
     pub fn side(self) -> f32 {
         match self {
             Self::Left => -1.0,
@@ -93,8 +94,8 @@ impl Eye {
     }
 }
 
-/// Makes an eye draw into its half of the target, the left eye into the left half, and follow the target's size. If the width is odd,
-/// neither eye draws the column in the middle.
+/// Makes an eye draw into its half of the target, the left eye into the left half, and follow the target's size. If the
+/// width is odd, neither eye draws the column in the middle.
 #[derive(Component, Reflect, Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
 #[type_path = "bevy_gs4d::stereo"]
@@ -138,8 +139,8 @@ pub struct Stereo {
     pub eyes: [Entity; 2],
 }
 
-/// Spawns a head with two eyes, and returns their entities. The left eye is drawn first: its camera has the order 0, the right camera the
-/// order 1.
+/// Spawns a head with two eyes, and returns their entities. The left eye is drawn first: its camera has the order 0,
+/// the right camera the order 1.
 ///
 /// [`StereoPlugin`](super::StereoPlugin) keeps the eyes at their positions.
 ///

@@ -1,4 +1,4 @@
-//! Why an app could not be drawn into a picture.
+//! The reasons why an app could not be drawn into a picture.
 //!
 //! In: the errors of loading, drawing, reading back and writing. Out: a [`TestingError`].
 
@@ -6,7 +6,7 @@ use crate::codec::CodecError;
 use bevy::asset::AssetLoadError;
 use std::sync::Arc;
 
-/// Why an app could not be drawn into a picture, or could not go on.
+/// The reason why an app could not be drawn into a picture, or could not go on.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TestingError {
@@ -15,8 +15,8 @@ pub enum TestingError {
     NoGpu,
     /// The machine has a GPU adapter, but the app has no renderer whose pipelines can be monitored.
     #[error(
-        "the app has no renderer: make it with bevy_gs4d::testing::app, or add Bevy's RenderPlugin; with PipelinedRenderingPlugin, \
-         settle the app before anything else finishes its plugins"
+        "the app has no renderer: make it with bevy_gs4d::testing::app, or add Bevy's RenderPlugin; with \
+         PipelinedRenderingPlugin, call settle before any other code finishes the app's plugins"
     )]
     NoRenderer,
     /// A plugin is missing that the called function needs.
@@ -50,8 +50,8 @@ pub enum TestingError {
     /// A shader or a pipeline does not compile.
     #[error("a pipeline failed: {0}")]
     Pipeline(String),
-    /// The app asked to exit, as Bevy does when the GPU reports an error.
-    #[error("rendering stopped; the log says why")]
+    /// The app has requested its exit, as Bevy does when the GPU reports an error.
+    #[error("the app stopped; the log has the reason")]
     Stopped,
     /// The GPU did not deliver the picture, or not all of it.
     #[error("the picture did not come back from the GPU")]

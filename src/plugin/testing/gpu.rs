@@ -12,7 +12,7 @@ pub fn has_gpu() -> bool {
     *FOUND.get_or_init(|| !GpuContext::adapters().is_empty())
 }
 
-/// Returns the backends to use. Linux uses Vulkan alone. Without DX12, wgpu needs no extra dispatch to validate each indirect dispatch.
+/// Returns the backends to use, on Linux only Vulkan: without DX12, wgpu adds no dispatch to validate indirect ones.
 pub(super) fn backends() -> Backends {
     if cfg!(target_os = "linux") { Backends::VULKAN } else { Backends::PRIMARY }
 }

@@ -1,6 +1,6 @@
 //! The app without a window.
 //!
-//! In: the size of a picture. Out: an app with Bevy's default plugins that draws into an [`Offscreen`], and in which no time passes.
+//! In: the size of a picture. Out: an app with Bevy's default plugins and an [`Offscreen`], in which no time passes.
 
 use super::gpu::{backends, has_gpu};
 use super::offscreen::Offscreen;
@@ -19,11 +19,12 @@ use bevy::winit::WinitPlugin;
 use glam::UVec2;
 use std::time::Duration;
 
-/// Returns an app with Bevy's `DefaultPlugins` and an [`Offscreen`] of `size` pixels, without a window. No time passes in the app.
+/// Returns an app with Bevy's `DefaultPlugins` and an [`Offscreen`] of `size` pixels. No time passes in the app.
 ///
-/// Add plugins, resources and systems to it as to any app; [`picture`](super::picture) runs it. Cameras whose target is the primary window
-/// draw into the picture, one over the other in their order: the picture includes a user interface and a `Camera2d` over the scene. The
-/// window is an entity that no display shows. Without a GPU nothing is drawn; all other systems run.
+/// Add plugins, resources and systems to it as to any app; [`picture`](super::picture) runs it. Cameras whose target is
+/// the primary window draw into the picture, one over the other in their order: the picture includes a user interface
+/// and a `Camera2d` over the scene. The window is an entity that no display shows. Without a GPU nothing is drawn; all
+/// other systems run.
 pub fn app(size: UVec2) -> App {
     app_with(size, |plugins| plugins)
 }
@@ -33,7 +34,7 @@ pub fn app_with(size: UVec2, adjust: impl FnOnce(PluginGroupBuilder) -> PluginGr
     let settings = WgpuSettings { backends: has_gpu().then(backends), ..WgpuSettings::default() };
     let plugins = DefaultPlugins
         .set(WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..WindowPlugin::default() })
-        // Bevy logs each abandoned read-back as a warning.
+        // Bevy logs each abandoned readback as a warning.
         .set(LogPlugin { filter: format!("{DEFAULT_FILTER},bevy_render::gpu_readback=error"), ..LogPlugin::default() })
         .set(AssetPlugin { unapproved_path_mode: UnapprovedPathMode::Allow, ..AssetPlugin::default() })
         .set(RenderPlugin {

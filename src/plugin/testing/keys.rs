@@ -1,6 +1,6 @@
 //! The keyboard of an app without a window.
 //!
-//! In: keys. Out: the messages that a window would send, from which Bevy makes `ButtonInput<KeyCode>` at the start of the next update.
+//! In: keys. Out: the messages that a window would send; Bevy makes `ButtonInput<KeyCode>` of them in the next update.
 
 use super::error::TestingError;
 use super::stepping::advance;
@@ -33,7 +33,7 @@ pub fn release(app: &mut App, key: KeyCode) -> Result<(), TestingError> {
 /// Presses a key for one update and releases it in the next. No time passes in either update.
 ///
 /// # Errors
-/// An app without Bevy's `InputPlugin`; an app that asks to exit.
+/// An app without Bevy's `InputPlugin`; an app that requests its exit.
 pub fn tap(app: &mut App, key: KeyCode) -> Result<(), TestingError> {
     start(app)?;
     press(app, key)?;

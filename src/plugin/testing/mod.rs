@@ -21,8 +21,8 @@
 //! # Ok::<(), testing::TestingError>(())
 //! ```
 //!
-//! [`picture`] waits until every capture and timeline in the world has been loaded; [`wait_for`] adds other assets of a game. Without a
-//! GPU, every function that draws returns [`TestingError::NoGpu`]: a test can print this error and return.
+//! [`picture`] waits until every capture and timeline in the world has been loaded; [`wait_for`] adds other assets of a
+//! game. Without a GPU, every function that draws returns [`TestingError::NoGpu`], with which a test can skip itself.
 //!
 //! # Play a game without drawing it
 //!

@@ -11,7 +11,7 @@ use bevy::reflect::Reflect;
 use bevy::render::render_resource::{TextureFormat, TextureUsages};
 use glam::UVec2;
 
-/// A picture that cameras draw into. [`app`](super::app) inserts one as a resource, for all cameras whose target is the primary window.
+/// A picture that cameras draw into. [`app`](super::app) inserts one as a resource, for all cameras of the window.
 #[derive(Resource, Reflect, Debug, Clone)]
 #[reflect(Resource, Debug, Clone)]
 #[type_path = "bevy_gs4d::testing"]
@@ -23,15 +23,13 @@ pub struct Offscreen {
 }
 
 impl Offscreen {
-    /// Creates another picture, for apps that draw into more than one; [`read`](super::read) returns it. `size` is in
-    /// pixels; 0 counts as 1.
+    /// Creates another picture of `size` pixels (0 counts as 1), which [`read`](super::read) returns.
     pub fn new(images: &mut Assets<Image>, size: UVec2) -> Self {
         Self::of(images, size, TextureFormat::Rgba8UnormSrgb)
     }
 
-    /// Creates a picture in HDR: RGBA in linear light, 16-bit floats, not clamped;
-    /// [`read_hdr`](super::read_hdr) returns it. Cameras that draw into it need [`Hdr`](bevy::camera::Hdr). `size` as in
-    /// [`new`](Self::new).
+    /// Creates a picture in HDR: RGBA in linear light, 16-bit floats, not clamped; [`read_hdr`](super::read_hdr)
+    /// returns it. Cameras that draw into it need [`Hdr`](bevy::camera::Hdr). `size` as in [`new`](Self::new).
     ///
     /// # Examples
     ///
@@ -58,8 +56,8 @@ impl Offscreen {
         Self { image: images.add(image), size }
     }
 
-    /// Returns the render target to insert on the entity of a `Camera3d`. Cameras of the primary window draw into the app's own picture
-    /// without it.
+    /// Returns the render target to insert on the entity of a `Camera3d`. Cameras of the primary window draw into the
+    /// app's own picture without it.
     pub fn target(&self) -> RenderTarget {
         RenderTarget::Image(self.image.clone().into())
     }

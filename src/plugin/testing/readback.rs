@@ -1,6 +1,6 @@
 //! Pictures of an app, read back from the GPU.
 //!
-//! In: an app and a time step. Out: the picture that the app's cameras draw after that step, in memory or as a PNG file.
+//! In: an app and a time step. Out: the picture that the app's cameras draw after that step, in memory or as a PNG.
 
 use super::error::TestingError;
 use super::offscreen::Offscreen;
@@ -32,14 +32,14 @@ use std::sync::mpsc::channel;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Longest time that a read-back may take. A limit in updates would fail on a GPU that is busy with the work of other processes.
+/// Longest time that a readback may take. A limit in updates would fail on a GPU that other processes use.
 const READBACK: Duration = Duration::from_secs(60);
 
-/// Waits until all assets are loaded, advances time by `step` in one update, and returns the picture in the app's own [`Offscreen`] at
-/// that time.
+/// Waits until all assets are loaded, advances time by `step` in one update, and returns the picture in the app's own
+/// [`Offscreen`] at that time.
 ///
 /// # Errors
-/// The errors of [`settle`]; an app without [`Offscreen`], or with an [`Offscreen`] in HDR; a read-back from the GPU that fails.
+/// The errors of [`settle`]; an app without [`Offscreen`], or with an [`Offscreen`] in HDR; a readback that fails.
 pub fn picture(app: &mut App, step: Duration) -> Result<RgbaImage, TestingError> {
     require_renderer(app)?;
     let offscreen = app.world().get_resource::<Offscreen>().cloned().ok_or(TestingError::NotOffscreen)?;
@@ -54,7 +54,7 @@ pub fn picture(app: &mut App, step: Duration) -> Result<RgbaImage, TestingError>
 /// Returns a picture as it was last drawn, at the time of the last [`picture`] or [`step`](super::step).
 ///
 /// # Errors
-/// Errors of drawing; a picture in HDR; a read-back from the GPU that fails.
+/// Errors of drawing; a picture in HDR; a readback from the GPU that fails.
 pub fn read(app: &mut App, offscreen: &Offscreen) -> Result<RgbaImage, TestingError> {
     if is_hdr(app, offscreen) {
         return Err(TestingError::Format { pixels: "16 bits of float in each channel", remedy: "read_hdr" });
@@ -63,11 +63,11 @@ pub fn read(app: &mut App, offscreen: &Offscreen) -> Result<RgbaImage, TestingEr
     RgbaImage::from_raw(size.x, size.y, pixels(app, offscreen, 4)?).ok_or(TestingError::Readback)
 }
 
-/// Returns a picture in HDR as it was last drawn: RGBA in linear light, not clamped. The camera's tonemapping has been applied;
-/// `Tonemapping::None` applies none.
+/// Returns a picture in HDR as it was last drawn: RGBA in linear light, not clamped. The camera's tonemapping has been
+/// applied; `Tonemapping::None` applies none.
 ///
 /// # Errors
-/// Errors of drawing; a picture that was not made by [`Offscreen::hdr`]; a read-back from the GPU that fails.
+/// Errors of drawing; a picture that was not made by [`Offscreen::hdr`]; a readback from the GPU that fails.
 pub fn read_hdr(app: &mut App, offscreen: &Offscreen) -> Result<Rgba32FImage, TestingError> {
     read_half(app, offscreen)?.to_floats().ok_or(TestingError::Readback)
 }
@@ -124,7 +124,7 @@ fn pixels(app: &mut App, offscreen: &Offscreen, bytes: usize) -> Result<Vec<u8>,
     Ok(unpadded(&data?, offscreen.size, bytes))
 }
 
-/// Copies the pixels without an update. `None` if rendering is pipelined, or if no update has drawn a picture of this size.
+/// Copies the pixels without an update. `None` if rendering is pipelined, or no picture of this size has been drawn.
 fn copied(app: &App, offscreen: &Offscreen, bytes: usize) -> Option<Result<Vec<u8>, TestingError>> {
     let world = app.get_sub_app(RenderApp)?.world();
     let image = world.get_resource::<RenderAssets<GpuImage>>()?.get(&offscreen.image)?;
@@ -169,16 +169,15 @@ fn wait(app: &mut App, arrived: &Mutex<Option<Vec<u8>>>) -> Result<Vec<u8>, Test
     Err(TestingError::Readback)
 }
 
-/// Removes the row padding of a texture that was read back: its rows are padded to a multiple of 256 bytes. `bytes` is the size of a
-/// pixel.
+/// Removes the padding of rows to a multiple of 256 bytes, which textures have when read back; `bytes` is per pixel.
 fn unpadded(data: &[u8], size: UVec2, bytes: usize) -> Vec<u8> {
     let row = size.x as usize * bytes;
     let rows = data.chunks(row.next_multiple_of(256)).map(|padded| &padded[..row.min(padded.len())]);
     rows.collect::<Vec<_>>().concat()
 }
 
-/// Writes `frames` pictures into `folder` as `0000.png`, `0001.png` and so on, and returns their paths. The first shows the current time,
-/// each further picture is `step` later.
+/// Writes `frames` pictures into `folder` as `0000.png`, `0001.png` and so on, and returns their paths. The first shows
+/// the current time, each further picture is `step` later.
 ///
 /// # Errors
 /// The errors of [`picture`] and [`save`].
@@ -199,7 +198,7 @@ pub fn pictures(app: &mut App, folder: &Path, frames: u32, step: Duration) -> Re
 /// # Errors
 /// A folder that cannot be created or written to, a full disk.
 pub fn save(picture: &RgbaImage, path: &Path) -> Result<(), TestingError> {
-    let failed = |path: &Path, error: io::Error| CodecError { path: path.to_owned(), kind: error.into() };
+    let failed = |path: &Path, error: io::Error| CodecError::at(path, error);
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder).map_err(|error| failed(folder, error))?;
     }

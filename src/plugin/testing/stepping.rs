@@ -11,11 +11,11 @@ use std::time::Duration;
 /// Duration of each update of [`step`] except the last: one frame at 60 Hz.
 const FRAME: Duration = Duration::from_nanos(16_666_667);
 
-/// Waits until all assets are loaded and advances the app by exactly `duration`, in updates of a 60th of a second and a shorter last
-/// update. No time passes afterwards.
+/// Waits until all assets are loaded and advances the app by exactly `duration`, in updates of a 60th of a second and a
+/// shorter last update. No time passes afterwards.
 ///
-/// Systems run as often as in a game at 60 Hz; [`picture`](super::picture) makes the whole step in one update instead. Needs no GPU, only an
-/// app with Bevy's `TimePlugin`. Pausing or scaling `Time<Virtual>` works as in a game.
+/// Systems run as often as in a game at 60 Hz; [`picture`](super::picture) makes the whole step in one update instead.
+/// Needs no GPU, only an app with Bevy's `TimePlugin`. Pausing or scaling `Time<Virtual>` works as in a game.
 ///
 /// # Errors
 /// An app without `TimePlugin`; an asset that cannot be loaded, or not within two minutes; errors of drawing.

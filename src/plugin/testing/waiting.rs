@@ -1,7 +1,7 @@
 //! Running an app until all assets are drawn.
 //!
-//! In: an app, and hooks that return the assets it still needs. Out: the same app with these assets loaded and uploaded and every pipeline
-//! compiled. No time has passed.
+//! In: an app, and hooks that return the assets it still needs. Out: the same app with these assets loaded and uploaded
+//! and every pipeline compiled. No time has passed.
 
 use super::error::TestingError;
 use super::pipelines::{pipelines_are_ready, require_renderer, watch_pipelines};
@@ -17,8 +17,8 @@ use std::time::{Duration, Instant};
 
 /// Longest time for plugins to get ready, for assets to load and for pipelines to compile.
 const LOAD_TIMEOUT: Duration = Duration::from_secs(120);
-/// Number of updates after which all uploaded captures are drawn completely. Buffers grow by the counts of an earlier frame, so a first
-/// frame may lack room.
+/// Number of updates after which all uploaded captures are drawn completely. Buffers grow by the counts of an earlier
+/// frame, so a first frame may lack room.
 const SETTLING: usize = 3;
 
 /// A function that returns the assets that are needed and not loaded yet.
@@ -34,9 +34,9 @@ impl Default for Awaited {
     }
 }
 
-/// Makes [`settle`] and all functions that take pictures wait for further assets besides captures and timelines: for each asset that
-/// `missing` returns, until `missing` no longer returns it or the asset server no longer tracks it. An asset that cannot be loaded is an
-/// error.
+/// Makes [`settle`] and all functions that take pictures wait for further assets besides captures and timelines: for
+/// each asset that `missing` returns, until `missing` no longer returns it or the asset server no longer tracks it. An
+/// asset that cannot be loaded is an error.
 ///
 /// # Examples
 ///
@@ -60,8 +60,9 @@ pub fn wait_for(app: &mut App, missing: fn(&mut World) -> Vec<UntypedAssetId>) {
 /// Runs the app until every capture and timeline in its world is loaded and drawn.
 ///
 /// # Errors
-/// [`TestingError::NoGpu`]; an app without a renderer, or without [`GaussianCapturePlugins`](crate::GaussianCapturePlugins) though it has
-/// captures; an asset that cannot be loaded, or not within two minutes; errors of drawing.
+/// [`TestingError::NoGpu`]; an app without a renderer, or without
+/// [`GaussianCapturePlugins`](crate::GaussianCapturePlugins) though it has captures; an asset that cannot be loaded, or
+/// not within two minutes; errors of drawing.
 pub fn settle(app: &mut App) -> Result<(), TestingError> {
     require_renderer(app)?;
     load(app)?;

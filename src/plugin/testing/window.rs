@@ -1,11 +1,11 @@
 //! The window of an app without a window.
 //!
-//! In: cameras whose target is the primary window. Out: a primary window that no display shows, as large as the [`Offscreen`]; and the
-//! [`Offscreen`] as the target of these cameras from the end of each update, when the frame is extracted and drawn, to the start of the
-//! next update.
+//! In: cameras whose target is the primary window. Out: a primary window that no display shows, as large as the
+//! [`Offscreen`]; and the [`Offscreen`] as the target of these cameras from the end of each update, when the frame is
+//! extracted and drawn, to the start of the next update.
 //!
-//! During an update these cameras have the window as their target. Bevy draws a user interface with the last camera of the window by
-//! default, and sends pointer events to the cameras of the window.
+//! During an update these cameras have the window as their target. Bevy draws a user interface with the last camera of
+//! the window by default, and sends pointer events to the cameras of the window.
 
 use super::offscreen::Offscreen;
 use bevy::app::{App, First, Last, PostUpdate};
@@ -26,7 +26,7 @@ use bevy::window::{PrimaryWindow, Window, WindowRef, WindowResized, WindowResolu
 #[derive(Resource, Default)]
 struct Lent(Vec<(Entity, RenderTarget, AssetId<Image>)>);
 
-/// Adds a window, unless the game's own plugins have added one, and the systems that make its cameras draw into the [`Offscreen`].
+/// Adds a window, unless the game has added one, and the systems that make its cameras draw into the [`Offscreen`].
 pub(super) fn add_window(app: &mut App, offscreen: &Offscreen) {
     let world = app.world_mut();
     let is_there = world.query_filtered::<Entity, With<PrimaryWindow>>().iter(world).next().is_some();
@@ -40,7 +40,7 @@ pub(super) fn add_window(app: &mut App, offscreen: &Offscreen) {
         .add_systems(Last, lend.run_if(resource_exists::<Offscreen>));
 }
 
-/// Resizes the window to the size of the picture, also after the game has resized it, and sends [`WindowResized`] as a display would.
+/// Resizes the window to the size of the picture, also after the game has resized it, and sends [`WindowResized`].
 fn fit_window(
     offscreen: Res<Offscreen>,
     mut windows: Query<(Entity, &mut Window), With<PrimaryWindow>>,
@@ -58,7 +58,7 @@ fn fit_window(
     }
 }
 
-/// Sets the picture as the target of the window's cameras, without marking the component as changed: the game did not change it.
+/// Sets the picture as the target of the window's cameras, bypassing change detection: the game changed nothing.
 fn lend(
     offscreen: Res<Offscreen>,
     windows: Query<(), With<PrimaryWindow>>,

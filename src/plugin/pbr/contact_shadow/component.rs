@@ -10,9 +10,10 @@ use glam::{Affine3A, Vec3};
 
 /// Darkens the ground beneath a capture: an optional component next to [`GaussianCapture3d`](crate::GaussianCapture3d).
 ///
-/// The ellipse is inscribed in the capture's bounds seen from above and follows them over time. It fades with the capture's opacity, with
-/// the height above the ground, and in fog. It needs no light, and costs as much as one small quad. It is drawn over opaque and
-/// alpha-masked meshes and behind captures, by every camera whose layers intersect the capture's, while the capture is visible.
+/// The ellipse is inscribed in the capture's bounds seen from above and follows them over time. It fades with the
+/// capture's opacity, with the height above the ground, and in fog. It needs no light, and costs as much as one small
+/// quad. It is drawn over opaque and alpha-masked meshes and behind captures, by every camera whose layers intersect
+/// the capture's, while the capture is visible.
 ///
 /// # Examples
 ///
@@ -30,9 +31,9 @@ use glam::{Affine3A, Vec3};
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
 #[type_path = "bevy_gs4d::pbr"]
 pub struct CaptureContactShadow {
-    /// Fraction of the light that it removes at the center, from 0 to 1. Default: 0.6.
+    /// Fraction of the light that the shadow removes at its center, from 0 to 1. Default: 0.6.
     pub strength: f32,
-    /// The width of its edge as a fraction of its radius, from 0 (hard) to 1. Half of the edge lies outside the bounds. Default: 0.8.
+    /// Width of the edge as a fraction of the radius, 0 (hard) to 1; half of it is outside the bounds. Default: 0.8.
     pub softness: f32,
     /// Height of the ground, y in world space. Default: 0.
     pub ground: f32,
@@ -49,7 +50,7 @@ impl Default for CaptureContactShadow {
 pub(super) struct Ellipse {
     /// Transform from the unit disk in the plane y = 0.
     pub(super) world_from_disk: Affine3A,
-    /// Fraction of the light that it removes, from 0 to 1.
+    /// Fraction of the light that the ellipse removes at its center, from 0 to 1.
     pub(super) strength: f32,
 }
 
@@ -59,12 +60,11 @@ impl CaptureContactShadow {
         unit(self.softness)
     }
 
-    /// Returns the ellipse beneath a box in world space; `None` if the box is below the ground or too high above it to cast a visible
-    /// shadow.
+    /// Returns the ellipse beneath a box in world space; `None` if the box is below the ground or too high above it.
     pub(super) fn beneath(&self, center: Vec3, half_size: Vec3) -> Option<Ellipse> {
         let above = center.y - half_size.y - self.ground;
         let reach = half_size.x.max(half_size.z);
-        // The strength is 0 at a height of its own width.
+        // The strength is 0 at a height equal to the width of the box.
         let fade = 1.0 - above.max(0.0) / (2.0 * reach);
         let strength = unit(self.strength) * unit(fade);
         // Half of the edge is outside the bounds.

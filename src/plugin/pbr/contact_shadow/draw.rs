@@ -1,7 +1,7 @@
 //! Draw: records the pass `contact_shadow` in Bevy's `Core3d` schedule.
 //!
-//! In: [`ContactShadowViews`]; a camera's target and the depth of its opaque meshes. Out: the target with the contact shadows that the
-//! camera sees. While the pipeline is being compiled, no shadow is drawn.
+//! In: [`ContactShadowViews`]; a camera's target and the depth of its opaque meshes. Out: the target with the contact
+//! shadows that the camera sees. While the pipeline is being compiled, no shadow is drawn.
 
 use super::prepare::ContactShadowViews;
 use bevy::camera::{MainPassResolutionOverride, Viewport};

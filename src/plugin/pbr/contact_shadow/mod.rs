@@ -1,7 +1,7 @@
 //! Contact shadows: a soft dark ellipse on the ground beneath a capture, for a fraction of the cost of a cast shadow.
 //!
-//! In: captures with a [`CaptureContactShadow`] and their bounds at the current time. Out: one render pass for each camera that sees a
-//! contact shadow:
+//! In: captures with a [`CaptureContactShadow`] and their bounds at the current time. Out: one render pass for each
+//! camera that sees a contact shadow:
 //!
 //! ```text
 //! component    settings, and the ellipse for a capture's bounds      main world
@@ -11,8 +11,8 @@
 //! draw         the pass `contact_shadow`                             Core3d, after opaque meshes and before captures
 //! ```
 //!
-//! Without contact shadows none of these systems runs. Contact shadows are not meshes with a custom material: Bevy would process the
-//! material in every frame of every app, and would draw blended meshes over captures.
+//! Without contact shadows none of these systems runs. Contact shadows are not meshes with a custom material: Bevy
+//! would process the material in every frame of every app, and would draw blended meshes over captures.
 
 mod component;
 mod draw;

@@ -1,7 +1,7 @@
 //! The pipeline of the pass `contact_shadow`, through Bevy's pipeline cache.
 //!
-//! In: the kind of a camera's target. Out: a pipeline for `shaders/pbr/contact_shadow.wgsl`, which has no bind group: its only input is one
-//! vertex buffer of [`GpuEllipse`]s.
+//! In: the kind of a camera's target. Out: a pipeline for `shaders/pbr/contact_shadow.wgsl`, which has no bind group:
+//! its only input is one vertex buffer of [`GpuEllipse`]s.
 
 use crate::plugin::render::nearest;
 use bevy::asset::Handle;

@@ -7,7 +7,7 @@ use super::extract::{ExtractedContactShadows, any_contact_shadow, any_extracted,
 use super::pipeline::{ContactShadowPipeline, ContactShadowShader};
 use super::prepare::{ContactShadowViews, any_view, prepare_contact_shadows};
 use crate::plugin::render::CaptureSystems;
-use crate::plugin::render::checked_pipelines::CheckedPipelines;
+use crate::plugin::render::targets::checked_pipelines::CheckedPipelines;
 use bevy::app::App;
 use bevy::asset::Assets;
 use bevy::core_pipeline::core_3d::{main_opaque_pass_3d, main_transparent_pass_3d};

@@ -1,12 +1,12 @@
 //! Prepare: finds the contact shadows that each camera sees.
 //!
-//! In: [`ExtractedContactShadows`]; Bevy's extracted cameras with their layers and fog. Out: [`ContactShadowViews`], whose buffer is
-//! written to the GPU.
+//! In: [`ExtractedContactShadows`]; Bevy's extracted cameras with their layers and fog. Out: [`ContactShadowViews`],
+//! whose buffer is written to the GPU.
 
 use super::extract::{ExtractedContactShadows, PlacedShadow};
 use super::pipeline::{ContactShadowKey, ContactShadowPipeline, GpuEllipse};
-use crate::plugin::render::checked_pipelines::CheckedPipelines;
-use crate::plugin::render::kept::created;
+use crate::plugin::render::targets::bindings::created;
+use crate::plugin::render::targets::checked_pipelines::CheckedPipelines;
 use bevy::camera::Camera3d;
 use bevy::camera::visibility::RenderLayers;
 use bevy::color::Alpha;

@@ -1,17 +1,17 @@
 //! Draw: records the pass `shade` in Bevy's `Core3d` schedule.
 //!
-//! In: cameras whose captures are shaded, with the captures' picture and depths. Out: for each such camera a pipeline, kept while it may be
-//! needed, and a shaded picture, which the composite uses instead of the original one.
+//! In: cameras whose captures are shaded, with the captures' picture and depths. Out: for each such camera a pipeline,
+//! kept while it may be needed, and a shaded picture, which the composite uses instead of the original one.
 
 use super::extract::ExtractedShading;
 use super::pipeline::{FORMAT, ShadePipeline};
 use super::uniform::GpuSettings;
 use crate::plugin::render::CaptureStatistics;
-use crate::plugin::render::capture_views::{CaptureView, CaptureViews};
-use crate::plugin::render::checked_pipelines::CheckedPipelines;
-use crate::plugin::render::extract::ExtractedViewSettings;
-use crate::plugin::render::kept::{KeptUniform, created};
-use crate::plugin::render::shade_requests::ShadeRequests;
+use crate::plugin::render::captures::extract::ExtractedViewSettings;
+use crate::plugin::render::targets::bindings::{CachedUniform, created};
+use crate::plugin::render::targets::checked_pipelines::CheckedPipelines;
+use crate::plugin::render::views::capture_views::{CaptureView, CaptureViews};
+use crate::plugin::render::views::shade_requests::ShadeRequests;
 use crate::renderer::WorkCounters;
 use crate::view::BlendSpace;
 use bevy::camera::Camera3d;
@@ -48,7 +48,7 @@ pub(super) fn any_request(requests: Res<ShadeRequests>, shades: Res<ShadeViews>)
 struct ShadeView {
     /// `None` if the GPU refuses the pipeline. Captures are drawn unshaded then.
     pipeline: Option<CachedRenderPipelineId>,
-    settings: KeptUniform<GpuSettings>,
+    settings: CachedUniform<GpuSettings>,
     /// Absent until captures are shaded.
     targets: Option<Targets>,
 }
@@ -61,7 +61,7 @@ struct Targets {
     group: BindGroup,
 }
 
-/// Requests the pipeline of every camera that may need one, even without captures, so that it is compiled while captures load.
+/// Requests the pipeline of every camera that may need one, so that it is compiled while captures load.
 pub(super) fn prepare_shade(
     device: Res<RenderDevice>,
     pipeline: Option<Res<ShadePipeline>>,
@@ -80,7 +80,7 @@ pub(super) fn prepare_shade(
     for (entity, view) in cameras.iter().filter(|(_, view)| may_need(view)) {
         let Some(&key) = keys.get(&view.retained_view_entity) else { continue };
         let pipeline = pipelines.specialize(&device, &cache, &pipeline, key);
-        let new = || ShadeView { pipeline, settings: KeptUniform::default(), targets: None };
+        let new = || ShadeView { pipeline, settings: CachedUniform::default(), targets: None };
         shades.0.entry(entity).or_insert_with(new).pipeline = pipeline;
     }
 }
@@ -153,8 +153,8 @@ impl Shading<'_> {
         Some(GpuSettings::new(size, blend_space == BlendSpace::Linear, drawn))
     }
 
-    /// Writes the shading settings of a view if they have changed, and returns the shaded picture, which is created again if the captures'
-    /// picture has changed; `None` if the GPU has no memory for it.
+    /// Writes the shading settings of a view if they have changed, and returns the shaded picture, which is created
+    /// again if the captures' picture has changed; `None` if the GPU has no memory for it.
     fn targets<'a>(&self, shade: &'a mut ShadeView, view: &CaptureView, settings: GpuSettings) -> Option<&'a Targets> {
         let (colors, depths) = (view.renderer.color()?, view.renderer.depth()?);
         let work = self.statistics.work();

@@ -1,12 +1,12 @@
 //! Extract: copies the boxes and shading of captures, and finds the cameras with fog.
 //!
-//! In (main world): captures with their boxes, [`ReceivesShadows`], Bevy's `NotShadowReceiver` and [`CaptureLight`]; cameras with `DistanceFog`.
-//! Out (render world): [`ExtractedShading`] and [`ShadeRequests`], by entity of the main world.
+//! In (main world): captures with their boxes, [`ReceivesShadows`], Bevy's `NotShadowReceiver` and [`CaptureLight`];
+//! cameras with `DistanceFog`. Out (render world): [`ExtractedShading`] and [`ShadeRequests`], by main-world entity.
 
 use super::components::{CaptureLight, ReceivesShadows};
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use crate::plugin::pbr::shadow::CastsShadows;
-use crate::plugin::render::shade_requests::ShadeRequests;
+use crate::plugin::render::views::shade_requests::ShadeRequests;
 use bevy::asset::Assets;
 use bevy::camera::Camera3d;
 use bevy::camera::primitives::Aabb;
@@ -28,8 +28,8 @@ pub(super) struct ExtractedShading(pub(super) MainEntityHashMap<PlacedShading>);
 /// The box of a capture and its shading.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct PlacedShading {
-    /// Transform from world space that maps the capture's box to the cube from −1 to 1; `None` if the capture surrounds every camera or is
-    /// not drawn.
+    /// Transform from world space that maps the capture's box to the cube from −1 to 1; `None` if the capture surrounds
+    /// every camera or is not drawn.
     pub(super) cube_from_world: Option<Affine3A>,
     pub(super) has_environment: bool,
     /// `None` with Bevy's `NotShadowReceiver`.
@@ -101,8 +101,8 @@ pub(super) fn extract_shading(
     }
 }
 
-/// Returns the transform from world space that maps a box in capture space to the cube from −1 to 1; `None` for a flattened or invalid
-/// transform.
+/// Returns the transform from world space that maps a box in capture space to the cube from −1 to 1; `None` for a
+/// flattened or invalid transform.
 fn cube_from_world(bounds: &Aabb, world_from_capture: Affine3A) -> Option<Affine3A> {
     // A flattened capture is not drawn, and its transform has no inverse.
     if world_from_capture.matrix3.determinant() == 0.0 {

@@ -1,7 +1,7 @@
 //! The pipeline of the pass `shade`, through Bevy's pipeline cache.
 //!
-//! In: the kind of a view (its bindings of Bevy, its shadow filter). Out: a pipeline for `shaders/pbr/shade.wgsl` with the view bindings of
-//! Bevy's meshes, and a layout for the remaining bindings.
+//! In: the kind of a view (its bindings of Bevy, its shadow filter). Out: a pipeline for `shaders/pbr/shade.wgsl` with
+//! the view bindings of Bevy's meshes, and a layout for the remaining bindings.
 
 use super::uniform::{GpuSettings, MOST_SHADINGS};
 use bevy::asset::Handle;
@@ -91,8 +91,8 @@ fn shader_defs(key: MeshPipelineKey, view: &MeshPipelineViewLayout) -> Vec<Shade
     if key.contains(MeshPipelineViewLayoutKey::ENVIRONMENT_MAP) {
         defs.push("ENVIRONMENT_MAP".into());
     }
-    // Bindings that depend on the device and on Bevy's features are visible only in the layout: the sampler of soft shadows, and arrays of
-    // environment maps.
+    // Bindings that depend on the device and on Bevy's features are visible only in the layout: the sampler of soft
+    // shadows, and arrays of environment maps.
     if view.main_layout.entries.iter().any(|entry| entry.binding == 4) {
         defs.push("PCSS_SAMPLERS_AVAILABLE".into());
     }

@@ -1,13 +1,13 @@
 //! Set-up of shading: adds the systems to their schedules.
 //!
-//! In: an app in which captures are drawn, with Bevy's `PbrPlugin`. Out: the same app, in which fog, shadows and light change captures.
-//! Without `PbrPlugin` captures are not shaded.
+//! In: an app in which captures are drawn, with Bevy's `PbrPlugin`. Out: the same app, in which fog, shadows and light
+//! change captures. Without `PbrPlugin` captures are not shaded.
 
 use super::draw::{ShadeViews, any_request, any_shade_view, prepare_shade, shade_captures};
 use super::extract::{ExtractedShading, any_shading, extract_shading};
 use super::pipeline::{ShadePipeline, ShadeShader, init_shade_pipeline};
 use crate::plugin::render::CaptureSystems;
-use crate::plugin::render::checked_pipelines::CheckedPipelines;
+use crate::plugin::render::targets::checked_pipelines::CheckedPipelines;
 use bevy::app::App;
 use bevy::asset::Assets;
 use bevy::core_pipeline::schedule::Core3d;

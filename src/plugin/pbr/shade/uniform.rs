@@ -36,7 +36,7 @@ pub(super) struct GpuSettings {
 }
 
 impl GpuSettings {
-    /// Creates the settings of a view of these captures. Captures that only fog changes are listed only together with shaded captures.
+    /// Creates the settings of a view. Captures that only fog changes are listed only together with shaded captures.
     pub(super) fn new<'a>(
         size: UVec2,
         is_linear: bool,
@@ -54,8 +54,8 @@ impl GpuSettings {
             }
             if drawn.count() > MOST_SHADINGS {
                 warn_once!(
-                    "a camera sees more than {MOST_SHADINGS} captures, of which some receive shadows or light: some of the others \
-                     are shaded like their neighbors; show fewer captures at once"
+                    "a camera sees more than {MOST_SHADINGS} captures, of which some receive shadows or light: some of \
+                     the others are shaded like their neighbors; show fewer captures at once"
                 );
             }
         }

@@ -11,13 +11,13 @@ use glam::{Affine3A, Vec3A};
 
 /// Makes a capture cast shadows: an optional component next to [`GaussianCapture3d`](crate::GaussianCapture3d).
 ///
-/// The capture casts a shadow for every light with shadow maps, whether a camera sees the capture or not, at its current time, with its
-/// opacity, crop and temporal filter. Hidden captures, captures on `RenderLayers` that the light does not have, and captures with Bevy's
-/// `NotShadowCaster` cast no shadows.
+/// The capture casts a shadow for every light with shadow maps, whether a camera sees the capture or not, at its
+/// current time, with its opacity, crop and temporal filter. Hidden captures, captures on `RenderLayers` that the light
+/// does not have, and captures with Bevy's `NotShadowCaster` cast no shadows.
 ///
-/// Without this component captures cast no shadows, since each shadow costs up to one more view of the capture, as large as the shadow map
-/// at its [`resolution`](Self::resolution): for a directional light one for each cascade and camera (four by default), for a point light
-/// six, for a spot light one. Views that do not contain the capture cost nothing.
+/// Without this component captures cast no shadows, since each shadow costs up to one more view of the capture, as
+/// large as the shadow map at its [`resolution`](Self::resolution): for a directional light one for each cascade and
+/// camera (four by default), for a point light six, for a spot light one. Views without the capture cost nothing.
 ///
 /// # Examples
 ///
@@ -36,14 +36,15 @@ use glam::{Affine3A, Vec3A};
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
 #[type_path = "bevy_gs4d::pbr"]
 pub struct CastsShadows {
-    /// Resolution at which the capture is drawn for shadows. All captures in one view of a light are drawn at the finest of their
-    /// resolutions. Default: [`ShadowResolution::Half`].
+    /// Resolution at which the capture is drawn for shadows. All captures in one view of a light are drawn at the
+    /// finest of their resolutions. Default: [`ShadowResolution::Half`].
     pub resolution: ShadowResolution,
-    /// Distance of the shadow behind the capture's surface, seen from the light, in extents of the capture's Gaussians: a splat has one
-    /// depth, so the depth of a surface is known up to about an extent (the standard deviation along an axis that three quarters of the
-    /// Gaussians, weighted by opacity, do not exceed). A value that is negative or not finite counts as 0. If the capture also receives shadows, these set in
-    /// gradually: its own from this distance to three times this distance. If the bias is too small, the capture darkens its own lit side; if it is
-    /// too large, light leaks between the capture and the ground below it. Default: 2.
+    /// Distance of the shadow behind the capture's surface, seen from the light, in extents of the capture's Gaussians:
+    /// a splat has one depth, so the depth of a surface is known up to about an extent (the standard deviation along an
+    /// axis that three quarters of the Gaussians, weighted by opacity, do not exceed). A value that is negative or not
+    /// finite counts as 0. If the capture also receives shadows, these set in gradually: its own from this distance to
+    /// three times this distance. If the bias is too small, the capture darkens its own lit side; if it is too large,
+    /// light leaks between the capture and the ground below it. Default: 2.
     pub bias: f32,
 }
 

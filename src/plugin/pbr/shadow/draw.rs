@@ -1,6 +1,7 @@
 //! Draw: draws captures into the shadow maps of lights, in Bevy's `Core3d` schedule, after meshes.
 //!
-//! In: the views of lights, prepared by [`prepare`](super::prepare). Out: for each view one compute pass and `write_depth` into the map.
+//! In: the views of lights, prepared by [`prepare`](super::prepare). Out: for each view one compute pass and
+//! `write_depth` into the map.
 
 use super::light_views::LightViews;
 use crate::plugin::render::{ActiveLists, CaptureRenderer, GpuGaussianCapture, WriteDepthPipeline};

@@ -1,8 +1,8 @@
 //! Extract: copies the captures that cast shadows.
 //!
-//! In (main world): captures with [`CastsShadows`] and without Bevy's `NotShadowCaster`, their bounds and layers; the extracted captures. Out
-//! (render world): [`ExtractedCasters`]; the extracted captures marked as casters, so that their active lists are updated even if no camera
-//! sees them.
+//! In (main world): captures with [`CastsShadows`] and without Bevy's `NotShadowCaster`, their bounds and layers; the
+//! extracted captures. Out (render world): [`ExtractedCasters`]; the extracted captures marked as casters, so that
+//! their active lists are updated even if no camera sees them.
 
 use super::casts::{CastsShadows, ShadowResolution};
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d};

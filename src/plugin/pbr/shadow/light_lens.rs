@@ -1,7 +1,7 @@
 //! Lens of a light: converts the view of a shadow map to the renderer's conventions.
 //!
-//! In: the projection and pose with which Bevy draws meshes into the map, and the bounds of captures. Out: [`LightLens`], which creates
-//! [`View`]s of captures, moved away from the light by their bias.
+//! In: the projection and pose with which Bevy draws meshes into the map, and the bounds of captures. Out:
+//! [`LightLens`], which creates [`View`]s of captures, moved away from the light by their bias.
 
 use crate::plugin::render::CameraLens;
 use crate::view::View;
@@ -21,8 +21,8 @@ pub(super) struct LightLens {
 impl LightLens {
     /// Returns the lens of a light for captures with these bounds; `None` for a projection that no light of Bevy has.
     ///
-    /// With parallel rays, the near plane moves back to the first capture: like meshes, captures in front of Bevy's near plane also cast
-    /// shadows.
+    /// With parallel rays, the near plane moves back to the first capture: like meshes, captures in front of Bevy's
+    /// near plane also cast shadows.
     pub(super) fn of<'a>(
         clip_from_light: &Mat4,
         world_from_light: Affine3A,
@@ -49,9 +49,9 @@ impl LightLens {
         Some(Self { lens, world_from_light, parallel, distance })
     }
 
-    /// Returns the view of a capture that is moved away from the light by the distance `bias`, world units; a bias that is negative or not
-    /// finite counts as 0. Its outline on the map does not change. `size` in pixels, `time` in the capture's unit. `None` if the transforms
-    /// flatten the capture or are not finite.
+    /// Returns the view of a capture that is moved away from the light by the distance `bias`, world units; a bias that
+    /// is negative or not finite counts as 0. Its outline on the map does not change. `size` in pixels, `time` in the
+    /// capture's unit. `None` if the transforms flatten the capture or are not finite.
     pub(super) fn view(
         &self,
         size: UVec2,

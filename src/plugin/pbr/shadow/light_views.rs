@@ -2,7 +2,7 @@
 //!
 //! In: the captures that [`prepare`](super::prepare) finds in each view. Out: [`LightViews`], read by drawing.
 
-use crate::plugin::render::kept::{IdleFrames, KeptUniform};
+use crate::plugin::render::targets::bindings::{CachedUniform, IdleFrames};
 use crate::plugin::render::{Drawn, WriteDepthBindings};
 use crate::renderer::{Renderer, ViewRenderer, WorkCounters};
 use bevy::ecs::resource::Resource;
@@ -26,7 +26,7 @@ pub(super) fn any_light_view(views: Res<LightViews>) -> bool {
 pub(super) struct LightView {
     pub(super) renderer: ViewRenderer,
     /// Corner (0) and size of the map.
-    pub(super) viewport: KeptUniform<UVec4>,
+    pub(super) viewport: CachedUniform<UVec4>,
     pub(super) depth_bindings: WriteDepthBindings,
     /// `None` if the GPU refuses the pipeline. Nothing is drawn then.
     pub(super) write_depth: Option<CachedRenderPipelineId>,
@@ -42,7 +42,7 @@ impl LightView {
         Self {
             // Shadow maps have depths alone.
             renderer: ViewRenderer::new(device.wgpu_device(), renderer).without_colors(),
-            viewport: KeptUniform::default(),
+            viewport: CachedUniform::default(),
             depth_bindings: WriteDepthBindings::default(),
             write_depth,
             drawn: Vec::new(),
@@ -57,8 +57,8 @@ impl LightView {
         self.viewport.set(viewport, device, queue, work);
     }
 
-    /// Returns whether the state is dropped: Bevy has not drawn the view for many frames. A light or a camera that is switched off for a
-    /// frame keeps it.
+    /// Returns whether the state is dropped: Bevy has not drawn the view for many frames. A light or a camera that is
+    /// switched off for a frame keeps it.
     pub(super) fn is_over(&self) -> bool {
         !self.live && self.idle.is_over()
     }

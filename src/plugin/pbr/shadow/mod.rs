@@ -1,7 +1,7 @@
 //! Shadows that captures cast.
 //!
-//! In: captures with [`CastsShadows`]; lights with shadow maps, which Bevy draws. Out: the same maps with captures among the meshes, so
-//! that all receivers of shadows also receive the shadows of captures.
+//! In: captures with [`CastsShadows`]; lights with shadow maps, which Bevy draws. Out: the same maps with captures
+//! among the meshes, so that all receivers of shadows also receive the shadows of captures.
 //!
 //! ```text
 //! casts         the component, with resolution and bias               main world
@@ -12,8 +12,9 @@
 //! draw          one compute pass, write_depth into the map            Core3d, after the shadow passes of meshes
 //! ```
 //!
-//! A shadow map has one depth per texel: captures are written at texels where they absorb more than half of the light, at the farther of
-//! their median and expected depth. Their shadows have hard edges, which Bevy's filters soften like the edges of mesh shadows.
+//! A shadow map has one depth per texel: captures are written at texels where they absorb more than half of the light,
+//! at the farther of their median and expected depth. Their shadows have hard edges, which Bevy's filters soften like
+//! the edges of mesh shadows.
 
 mod casts;
 mod draw;

@@ -1,12 +1,12 @@
 //! Set-up of shadows that captures cast: adds the systems to their schedules.
 //!
-//! In: an app in which captures are drawn and lights have shadow maps. Out: the same app, in which captures cast shadows.
+//! In: an app in which captures are drawn and lights have shadow maps. Out: captures that cast shadows.
 
 use super::draw::{cast_cascades, cast_shared};
 use super::extract::{ExtractedCasters, any_caster, any_casts, extract_casters};
 use super::light_views::{LightViews, any_light_view};
 use super::prepare::prepare_light_views;
-use crate::plugin::render::rests::Rests;
+use crate::plugin::render::captures::back_off::BackOff;
 use crate::plugin::render::{ExtractedCaptures, extract_captures};
 use bevy::app::App;
 use bevy::core_pipeline::schedule::{Core3d, Core3dSystems};
@@ -25,7 +25,7 @@ pub(in crate::plugin::pbr) fn build(app: &mut App) {
     render_app
         .init_resource::<ExtractedCasters>()
         .init_gpu_resource::<LightViews>()
-        .init_gpu_resource::<Rests<RetainedViewEntity>>()
+        .init_gpu_resource::<BackOff<RetainedViewEntity>>()
         .add_systems(ExtractSchedule, extract_casters.run_if(any_casts.or_else(any_caster)).after(extract_captures))
         .add_systems(
             Render,

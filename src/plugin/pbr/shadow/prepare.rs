@@ -1,20 +1,20 @@
 //! Prepare: collects the captures in each view of a light and prepares the renderer's working buffers.
 //!
-//! In: [`ExtractedCasters`], the views of lights whose shadow maps Bevy draws this frame. Out: [`LightViews`], with all inputs of drawing
-//! written to the GPU. In the steady state no GPU object is created.
+//! In: [`ExtractedCasters`], the views of lights whose shadow maps Bevy draws this frame. Out: [`LightViews`], with all
+//! inputs of drawing written to the GPU. In the steady state no GPU object is created.
 
 use super::casts::ShadowResolution;
 use super::extract::{Caster, ExtractedCasters};
 use super::light_lens::LightLens;
 use super::light_views::{LightView, LightViews};
-use crate::plugin::render::checked_pipelines::CheckedPipelines;
+use crate::plugin::render::captures::back_off::BackOff;
 use crate::plugin::render::logged::{error_once_each, warn_once_each};
-use crate::plugin::render::rests::Rests;
+use crate::plugin::render::targets::checked_pipelines::CheckedPipelines;
 use crate::plugin::render::{
     ActiveLists, CaptureRenderer, Drawn, ExtractedCaptures, GpuGaussianCapture, WriteDepthKey, WriteDepthPipeline,
     WrittenDepth, group_copies,
 };
-use crate::renderer::memory::catch_known;
+use crate::renderer::device::memory::catch_known;
 use crate::renderer::{ColorPrecision, GpuError, Instance, ViewParameters};
 use crate::view::{Background, BlendSpace, DebugView};
 use bevy::camera::primitives::Frustum;
@@ -85,18 +85,18 @@ pub(super) fn prepare_light_views(
     mut depth_writers: ResMut<CheckedPipelines<WriteDepthPipeline>>,
     phases: Res<ViewBinnedRenderPhases<Shadow>>,
     mut views: ResMut<LightViews>,
-    mut rests: ResMut<Rests<RetainedViewEntity>>,
+    mut back_off: ResMut<BackOff<RetainedViewEntity>>,
     lights: Query<(&ExtractedView, &Frustum, Option<&RenderLayers>), With<ShadowView>>,
 ) {
     let _span = debug_span!("gs4d/shadows").entered();
     let Some(renderer) = renderer else { return };
-    rests.count_frame();
+    back_off.count_frame();
     for state in views.0.values_mut() {
         state.live = false;
     }
     for (light, frustum, layers) in &lights {
         let key = light.retained_view_entity;
-        if !phases.contains_key(&key) || rests.contains(&key) {
+        if !phases.contains_key(&key) || back_off.contains(&key) {
             continue;
         }
         let within = casters.within(frustum, layers.unwrap_or_default());
@@ -115,9 +115,9 @@ pub(super) fn prepare_light_views(
             Ok(Ok(())) => continue,
             Ok(Err(failure)) if !failure.is_of_device() => failure,
             Ok(Err(failure)) | Err(failure) => {
-                // Its objects are invalid.
+                // Objects of the view are invalid.
                 views.0.remove(&key);
-                rests.begin(key);
+                back_off.begin(key);
                 failure
             }
         };
@@ -163,14 +163,14 @@ fn prepare_light_view(
         state.drawn.clear();
     } else if state.renderer.is_short_of_room() {
         warn_once_each(
-            "shadows of captures are drawn whole but slowly: a view of a light has more pairs of splats and tiles than fit on this GPU; \
-             let fewer captures cast shadows, or cast them at a lower CastsShadows::resolution",
+            "shadows of captures are drawn whole but slowly: a view of a light has more pairs of splats and tiles than \
+             fit on this GPU; let fewer captures cast shadows, or cast them at a lower CastsShadows::resolution",
         );
     }
     prepared
 }
 
-/// Returns the side of a pixel in texels for the finest of the resolutions, reduced until it divides the size of the map.
+/// Returns the side of a pixel in texels for the finest resolution, reduced until it divides the size of the map.
 fn scale(map: UVec2, resolutions: impl Iterator<Item = ShadowResolution>) -> u32 {
     let wanted = resolutions.min().unwrap_or_default().scale();
     let divides = |scale: &u32| map % *scale == UVec2::ZERO;

@@ -104,8 +104,8 @@ impl Timeline {
 }
 
 impl Track {
-    /// Returns the last clip that has begun at `time`, in seconds of the timeline, also if the clip has ended; before the first clip, the
-    /// first. `None` if the track has no clip.
+    /// Returns the last clip that has begun at `time`, in seconds of the timeline, also if the clip has ended; before
+    /// the first clip, the first. `None` if the track has no clip.
     pub fn clip_at(&self, time: f64) -> Option<&Clip> {
         self.clips.iter().rev().find(|clip| clip.has_begun(time)).or(self.clips.first())
     }

@@ -1,7 +1,7 @@
 //! A clip: a part of a capture, at a time of a timeline.
 //!
-//! In: a capture, a range of the capture, a start and a speed. Out: whether the clip is shown at a time, its fade, and the [`Playback`] of
-//! its entity.
+//! In: a capture, a range of the capture, a start and a speed. Out: whether the clip is shown at a time, its fade, and
+//! the [`Playback`] of its entity.
 
 use super::error::InvalidTimeline;
 use crate::plugin::component::GaussianCapture;
@@ -17,8 +17,8 @@ pub struct Clip {
     pub capture: Handle<GaussianCapture>,
     /// The start of the clip, in seconds of the timeline: 0 or later.
     pub start: f32,
-    /// The first and the last played moment, in seconds of the capture. Beyond the capture's end, its last moment is shown; a backward clip
-    /// begins with it.
+    /// The first and the last played moment, in seconds of the capture. Beyond the capture's end, its last moment is
+    /// shown; a backward clip begins with it.
     pub range: [f32; 2],
     /// Seconds of the capture per second of the timeline; negative plays from the last moment to the first. Not 0.
     pub speed: f32,
@@ -26,8 +26,8 @@ pub struct Clip {
     pub fade: [f32; 2],
 }
 
-/// Seconds by which consecutive clips may overlap or be apart, because speeds and ends are rounded. A clip is shown this much early, so that
-/// no such gap is visible.
+/// Seconds by which consecutive clips may overlap or be apart, because speeds and ends are rounded. A clip is shown
+/// this much early, so that no such gap is visible.
 pub(super) const TOUCH: f32 = 1e-4;
 
 impl Clip {
@@ -41,8 +41,8 @@ impl Clip {
         self.start + self.duration()
     }
 
-    /// Returns whether the clip is shown at `time`, in seconds of the timeline: from its start until just before its end, and at its end if
-    /// the timeline, which lasts `duration` seconds, also ends there.
+    /// Returns whether the clip is shown at `time`, in seconds of the timeline: from its start until just before its
+    /// end, and at its end if the timeline, which lasts `duration` seconds, also ends there.
     pub fn shows(&self, time: f64, duration: f32) -> bool {
         let end = f64::from(self.end());
         self.has_begun(time) && (time < end || self.end() >= duration - TOUCH && time <= f64::from(duration))
@@ -61,8 +61,8 @@ impl Clip {
         fraction(time - start, self.fade[0]).min(fraction(end - time, self.fade[1]))
     }
 
-    /// Returns the playback that shows this clip while it follows the timeline's clock. `duration` is the duration of the capture in
-    /// seconds, `None` until the capture has been loaded.
+    /// Returns the playback that shows this clip while it follows the timeline's clock. `duration` is the duration of
+    /// the capture in seconds, `None` until the capture has been loaded.
     pub(super) fn playback(&self, duration: Option<f32>) -> Playback {
         let ([start, end], backwards) = (self.range, self.speed < 0.0);
         // Without this offset, playback would begin at the capture's end immediately.

@@ -1,7 +1,7 @@
 //! The errors of an invalid timeline.
 //!
-//! In: the checks of [`asset`](super::asset) and [`clip`](super::clip). Out: [`InvalidTimeline`], whose text names the track, the clip or
-//! the marker, the fault and the remedy.
+//! In: the checks of [`asset`](super::asset) and [`clip`](super::clip). Out: [`InvalidTimeline`], whose text names the
+//! track, the clip or the marker, the fault and the remedy.
 
 /// The reason why a timeline is invalid. Clips and markers are counted from 1, in the order in which they are written.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -45,7 +45,8 @@ pub enum InvalidTimeline {
     },
     /// Two clips of a track overlap in time.
     #[error(
-        "track {track:?}: clip {second} starts at {start} s, before clip {first} ends at {end} s; move one to another track"
+        "track {track:?}: clip {second} starts at {start} s, before clip {first} ends at {end} s; move one to another \
+         track"
     )]
     Overlap {
         /// The track's name.

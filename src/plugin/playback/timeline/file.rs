@@ -1,7 +1,7 @@
 //! The timeline as a file.
 //!
-//! In: the text of a `*.timeline.ron`, in the format that the [module](super) describes. Out: a [`Timeline`] whose captures have begun to
-//! load, or a [`TimelineError`], to which Bevy adds the path.
+//! In: the text of a `*.timeline.ron`, in the format that the [module](super) describes. Out: a [`Timeline`] whose
+//! captures have begun to load, or a [`TimelineError`], to which Bevy adds the path.
 
 use super::asset::{Timeline, Track};
 use super::clip::Clip;

@@ -1,8 +1,7 @@
 //! Timelines: the times at which captures play.
 //!
 //! In: a file named `*.timeline.ron`, or a [`Timeline`] created in code, on a [`TimelinePlayer`]. Out: an entity for
-//! each track, whose capture, playback, fade and visibility follow the player; and a message for every reached
-//! marker.
+//! each track, whose capture, playback, fade and visibility follow the player; and a message for every reached marker.
 //!
 //! ```ron
 //! (
@@ -18,20 +17,20 @@
 //! )
 //! ```
 //!
-//! Paths are paths of `AssetServer::load`. `in` and `out` are seconds of the capture, `start` and `time` of the timeline. A clip
-//! lasts `(out - in) / |speed|`; the clips of a track may touch but not overlap: to cross-fade, use two tracks. The timeline lasts
-//! until its last clip or marker; `duration: 10.0` makes it longer.
+//! Paths are paths of `AssetServer::load`. `in` and `out` are seconds of the capture, `start` and `time` of the
+//! timeline. A clip lasts `(out - in) / |speed|`; the clips of a track may touch but not overlap: to cross-fade, use
+//! two tracks. The timeline lasts until its last clip or marker; `duration: 10.0` makes it longer.
 
 mod asset;
 mod clip;
-mod direct;
 mod error;
 mod file;
 mod player;
+mod systems;
 
 pub use asset::{Timeline, Track};
 pub use clip::Clip;
-pub(super) use direct::{advance_timelines, bind_tracks, direct_tracks};
 pub use error::InvalidTimeline;
 pub use file::{TimelineError, TimelineLoader};
 pub use player::{ClipFade, TimelinePlayer, TimelineTrack};
+pub(super) use systems::{advance_timelines, bind_tracks, update_tracks};

@@ -1,6 +1,6 @@
 //! The components of a timeline in the world.
 //!
-//! In: a handle to a [`Timeline`] on an entity. Out: this entity as a clock and as the parent of one child for each track.
+//! In: a handle to a [`Timeline`] on an entity. Out: this entity as a clock, and as the parent of a child per track.
 
 use super::asset::Timeline;
 use super::clip::Clip;
@@ -18,12 +18,12 @@ use bevy::transform::components::Transform;
 
 /// Plays a timeline.
 ///
-/// The player's [`Playback`] is the playhead: play, pause, seek, reverse and loop it like the playback of a capture, or let it
-/// [follow a clock](crate::playback::FollowsClock). The player's [`PlaybackClock`] has the time of the playhead, for its tracks. Other
-/// captures and timelines can also follow the player. It begins to play once the captures of all clips can be drawn; failed captures are
-/// not awaited.
+/// The player's [`Playback`] is the playhead: play, pause, seek, reverse and loop it like the playback of a capture, or
+/// let it [follow a clock](crate::playback::FollowsClock). The player's [`PlaybackClock`] has the time of the playhead,
+/// for its tracks. Other captures and timelines can also follow the player. It begins to play once the captures of all
+/// clips can be drawn; failed captures are not awaited.
 ///
-/// Each track is played by the child with the [`TimelineTrack`] of its name. A child is spawned for a track without one.
+/// Each track is played by the child with the [`TimelineTrack`] of its name. Missing children are spawned.
 ///
 /// Default: a handle without an asset; nothing plays.
 ///
@@ -45,9 +45,10 @@ use bevy::transform::components::Transform;
 #[require(Playback, PlaybackClock = PlaybackClock::manual(), Transform, Visibility)]
 pub struct TimelinePlayer(pub Handle<Timeline>);
 
-/// Names the track that sets this entity's capture, playback, fade and visibility: a track of the timeline on the parent entity.
+/// Names the track of the parent's timeline that sets this entity's capture, playback, fade and visibility.
 ///
-/// To choose the transform and other components of a track's entity, spawn it as a child of the [`TimelinePlayer`]. Default: the empty name.
+/// To choose the transform and other components of a track's entity, spawn it as a child of the [`TimelinePlayer`].
+/// Default: the empty name.
 ///
 /// # Examples
 ///
@@ -65,11 +66,11 @@ pub struct TimelinePlayer(pub Handle<Timeline>);
 #[derive(Component, Reflect, Debug, Default, Clone, PartialEq, Eq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
 #[type_path = "bevy_gs4d::playback"]
-#[require(GaussianCapture3d, ClipFade, Directed)]
+#[require(GaussianCapture3d, ClipFade, PlayedClip)]
 pub struct TimelineTrack(pub String);
 
-/// A factor on a capture's opacity, from 0 to 1, in addition to the opacity of its [`CaptureSettings`](crate::render::CaptureSettings). A
-/// timeline's fades set it. Default: 1.
+/// A factor on a capture's opacity, from 0 to 1, in addition to the opacity of its
+/// [`CaptureSettings`](crate::render::CaptureSettings). A timeline's fades set it. Default: 1.
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
 #[type_path = "bevy_gs4d::playback"]
@@ -83,4 +84,4 @@ impl Default for ClipFade {
 
 /// The clip that a track's entity plays; `None` before its first clip.
 #[derive(Component, Debug, Default)]
-pub(in crate::plugin::playback) struct Directed(pub(super) Option<Clip>);
+pub(in crate::plugin::playback) struct PlayedClip(pub(super) Option<Clip>);

@@ -1,11 +1,11 @@
-//! Why a scene could not be filmed.
+//! The reasons why a scene could not be filmed.
 //!
 //! In: the faults of a film, of its folder, and the errors of drawing. Out: a [`FilmError`].
 
 use crate::plugin::testing::TestingError;
 use std::path::PathBuf;
 
-/// Why a scene could not be filmed.
+/// The reason why a scene could not be filmed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FilmError {
@@ -48,7 +48,10 @@ pub enum FilmError {
     #[error("no picture is left for training: hold out fewer cameras or fewer times")]
     NoTraining,
     /// The folder holds files.
-    #[error("{}: the folder is not empty, and its files are not overwritten: name a new folder, or empty this one", .0.display())]
+    #[error(
+        "{}: the folder is not empty, and its files are not overwritten: name a new folder, or empty this one",
+        .0.display()
+    )]
     Occupied(PathBuf),
     /// The app could not be drawn, or a file could not be written.
     #[error(transparent)]

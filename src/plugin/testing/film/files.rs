@@ -1,7 +1,7 @@
 //! The files of a filmed dataset.
 //!
-//! In: pictures with their camera poses and times. Out: PNG files in `train`, `val` and `test`, and a camera file `transforms_*.json` in the
-//! Blender form for each split that has a picture.
+//! In: pictures with their camera poses and times. Out: PNG files in `train`, `val` and `test`, and a camera file
+//! `transforms_*.json` in the Blender form for each split that has a picture.
 
 use super::error::FilmError;
 use super::hold_out::Split;
@@ -24,8 +24,8 @@ pub(super) struct Files<'a> {
     frames: [Vec<Frame>; Split::ALL.len()],
 }
 
-/// The entries of a whole camera file. With `fl_x`, `fl_y`, `cx` and `cy` it would describe an intrinsics camera, which the original
-/// rasterizes by a placeholder instead of its field of view.
+/// The entries of a whole camera file. With `fl_x`, `fl_y`, `cx` and `cy` it would describe an intrinsics camera, which
+/// the original rasterizes by a placeholder instead of its field of view.
 #[derive(Debug, Clone, Serialize)]
 struct Head {
     /// Horizontal field of view in radians.
@@ -91,7 +91,7 @@ impl<'a> Files<'a> {
         Ok(())
     }
 
-    /// Waits for the pictures, and writes the camera files. Returns the number of pictures for training, validation and test.
+    /// Waits for the pictures and writes the camera files. Returns the numbers of training, validation and test views.
     pub(super) fn finish(self) -> Result<[usize; 3], FilmError> {
         let Self { folder, writer, head, frames } = self;
         writer.finish()?;
@@ -119,5 +119,5 @@ fn write(path: &Path, file: &CameraFile<'_>) -> Result<(), FilmError> {
 }
 
 fn failed(path: &Path, error: io::Error) -> FilmError {
-    TestingError::Save(CodecError { path: path.to_owned(), kind: error.into() }).into()
+    TestingError::Save(CodecError::at(path, error)).into()
 }

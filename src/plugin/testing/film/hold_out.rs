@@ -2,20 +2,20 @@
 //!
 //! In: the index of a camera and of a time. Out: the [`Split`] of their picture.
 
-/// The pictures that are held out from training: by camera and by time. Default: every eighth camera is for the test, and the camera in the
-/// middle between two of these for validation; no time is held out.
+/// The pictures that are held out from training: by camera and by time. Default: every eighth camera is for the test,
+/// and the camera in the middle between two of these for validation; no time is held out.
 ///
-/// A picture is for the test if its camera or its time is, else for validation if its camera or its time is, else for training. 0 holds out
-/// nothing. The first and the last time are never held out: training then covers all times in between.
+/// A picture is for the test if its camera or its time is, else for validation if its camera or its time is, else for
+/// training. 0 holds out nothing. The first and the last time are never held out, so that training covers all times.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct HoldOut {
-    /// Every how many cameras one is for the test.
+    /// One of this many cameras is for the test.
     pub test_cameras: usize,
-    /// Every how many cameras one is for validation.
+    /// One of this many cameras is for validation.
     pub validation_cameras: usize,
-    /// Every how many times one is for the test.
+    /// One of this many times is for the test.
     pub test_times: usize,
-    /// Every how many times one is for validation.
+    /// One of this many times is for validation.
     pub validation_times: usize,
 }
 

@@ -1,14 +1,14 @@
 //! Datasets of training views, filmed in a Bevy scene.
 //!
-//! In: an app, a [`Film`] (cameras, times, lens, picture size) and a folder. Out: pictures with coverage and camera files of the Blender
-//! form, by split, from which `gs4d train` and `gs4d eval` read.
+//! In: an app, a [`Film`] (cameras, times, lens, picture size) and a folder. Out: pictures with coverage and camera
+//! files of the Blender form, by split, from which `gs4d train` and `gs4d eval` read.
 //!
-//! * `rig`: where the cameras are
-//! * `hold_out`: which split a picture belongs to
-//! * `shooting`: the pictures, from the app
+//! * `rig`: the poses of the cameras
+//! * `hold_out`: the split of each picture
+//! * `shooting`: draws the pictures with the app
 //! * `files`: the files of the dataset
 //! * `writer`: encodes and writes pictures while the next ones are drawn
-//! * `error`: why a scene could not be filmed
+//! * `error`: the reasons why a scene could not be filmed
 
 mod error;
 mod files;

@@ -15,8 +15,8 @@ pub struct Rig {
 }
 
 impl Rig {
-    /// Returns `count` cameras on the upper half of a sphere, from the top to the horizon, that look at its center. They are spread evenly
-    /// (a Fibonacci spiral).
+    /// Returns `count` cameras on the upper half of a sphere, from the top to the horizon, that look at its center.
+    /// They are spread evenly (a Fibonacci spiral).
     pub fn hemisphere(center: Vec3, radius: f32, count: usize) -> Self {
         let golden_angle = PI * (3.0 - 5.0_f32.sqrt());
         let place = |index: usize| {
@@ -36,8 +36,9 @@ impl Rig {
         Self::inward(center, (0..count).map(|index| center + place(index)))
     }
 
-    /// Returns an upright grid of cameras that look at `center`: `counts` columns and rows, row by row from the top left, `extent` wide and
-    /// high, at `distance` from the center in the direction `yaw` around the vertical (radians; 0 is +z).
+    /// Returns an upright grid of cameras that look at `center`: `counts` columns and rows, row by row from the top
+    /// left, `extent` wide and high, at `distance` from the center in the direction `yaw` around the vertical (radians;
+    /// 0 is +z).
     pub fn grid(center: Vec3, distance: f32, yaw: f32, extent: Vec2, counts: UVec2) -> Self {
         let turn = Quat::from_rotation_y(yaw);
         // A single column or row is in the middle.

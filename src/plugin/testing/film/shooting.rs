@@ -2,9 +2,10 @@
 //!
 //! In: an app and a [`Film`]. Out: the dataset's files; the app at the last time, with its own cameras as before.
 //!
-//! One camera is moved from pose to pose. Shading takes most of the time, so a picture is drawn twice only where its pose is known: lists of lights,
-//! which Bevy sizes by counts of the frame before, are whole in the second. The camera draws in linear light over transparent black, so that a pixel holds its color times its
-//! coverage. Pictures are encoded and written on other threads while the next ones are drawn.
+//! One camera is moved from pose to pose. Bevy sizes its lists of lights by the counts of the previous frame, so a
+//! picture is drawn twice, and more often the first time at a pose. The camera draws in linear light over transparent
+//! black, so that a pixel holds its color times its coverage. Pictures are encoded and written on other threads while
+//! the next ones are drawn.
 
 use super::error::FilmError;
 use super::files::Files;
@@ -50,19 +51,19 @@ pub struct Film {
     pub lens: PerspectiveProjection,
     /// The samples for each pixel. Without multisampling, coverage is 0 or 1 at the edges of meshes.
     pub msaa: Msaa,
-    /// Whether each camera has its own offset of the shutter: camera `i` films after the fraction `fract(i φ)` of the step from each time to
-    /// the next (φ: the golden ratio), and at the last time itself. Cameras times times are as many different moments: a capture trained on
-    /// them has no moment without a picture near it. No effect on a path.
+    /// Whether each camera has its own offset of the shutter: camera `i` films after the fraction `fract(i φ)` of the
+    /// step from each time to the next (φ: the golden ratio), and at the last time itself. Cameras times times are as
+    /// many different moments: a capture trained on them has no moment without a picture near it. No effect on a path.
     pub stagger: bool,
     /// The pictures that are not for training.
     pub hold_out: HoldOut,
-    /// Inserts components that the camera needs, such as fog. The film inserts its own after it: lens, target, clear color, no tonemapping.
+    /// Inserts components that the camera needs, such as fog, before those of the film: lens, target, clear color.
     pub prepare_camera: fn(&mut EntityWorldMut<'_>),
 }
 
 impl Film {
-    /// Returns a film of 512x512 pictures with the default lens of Bevy, four samples for each pixel, no staggered shutters and the default
-    /// [`HoldOut`].
+    /// Returns a film of 512x512 pictures with the default lens of Bevy, four samples for each pixel, no staggered
+    /// shutters and the default [`HoldOut`].
     pub fn new(rig: Rig, times: Vec<f32>) -> Self {
         Self {
             rig,
@@ -90,16 +91,18 @@ pub struct Filmed {
 
 /// Films the scene of an app into `folder`, as a dataset in the Blender form for `gs4d train --data FOLDER`.
 ///
-/// For each time in increasing order, the app advances to it as by [`step`](crate::testing::step), `set_time` receives the world and the time in seconds, and every
-/// camera of the rig draws while no time passes; with [staggered](Film::stagger) shutters, the app advances to the moment of each camera. A
-/// scene that the app's own time moves, such as a simulation, needs nothing in `set_time`: `|_, _| {}`. Two updates draw each picture, the
-/// first of each pose, those of scenes with captures and those of apps with pipelined rendering more. The app's own cameras are inactive meanwhile. `progress` receives the number of pictures drawn and the number of all.
+/// For each time in increasing order, the app advances to it as by [`step`](crate::testing::step), `set_time` receives
+/// the world and the time in seconds, and every camera of the rig draws while no time passes; with
+/// [staggered](Film::stagger) shutters, the app advances to the moment of each camera. A scene that the app's own time
+/// moves, such as a simulation, needs nothing in `set_time`: `|_, _| {}`. A picture takes two updates; the first
+/// picture of a pose, scenes with captures and apps with pipelined rendering take more. The app's own cameras are
+/// inactive meanwhile. `progress` receives the number of pictures drawn and the number of all pictures.
 ///
-/// The pictures are 8-bit RGBA with straight alpha, which is the coverage: 1 on opaque meshes, 0 where nothing is drawn. Times become 0 to 1
-/// in the camera files, from the first time to the last; the entry `seconds` has the seconds.
+/// The pictures are 8-bit RGBA with straight alpha, which is the coverage: 1 on opaque meshes, 0 where nothing is
+/// drawn. Times become 0 to 1 in the camera files, from the first time to the last; the entry `seconds` has seconds.
 ///
 /// # Errors
-/// A film without cameras, times or pictures for training; a folder that is not empty; errors of drawing and of writing, by file.
+/// A film without cameras, times or pictures for training; a folder that is not empty; errors of drawing and writing.
 ///
 /// # Examples
 ///
@@ -234,7 +237,7 @@ fn shoot(
                 (now, is_set) = (moment, true);
             }
             wait_for_gpu(app)?;
-            // Lists of lights grow over some updates when a pose first sees them.
+            // Lists of lights grow over some updates at the first picture of a pose.
             if index == 0 || film.rig.is_path {
                 settle(app)?;
             }
@@ -303,7 +306,8 @@ mod tests {
         assert!(gaps < 0.5 / 12.0, "the moments are spread over the step, at most {gaps} s apart");
         assert!(all[2].iter().all(|(moment, _)| *moment == Duration::from_secs(2)), "all film the last time itself");
         let steady = Film { stagger: false, ..film };
-        assert!(moments(&steady, &times, 1).iter().all(|(moment, _)| *moment == times[1]), "or all at each time");
+        let together = moments(&steady, &times, 1).iter().all(|(moment, _)| *moment == times[1]);
+        assert!(together, "without staggering, all cameras film at the time itself");
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The pictures of a film, encoded and written while the next ones are drawn.
 //!
-//! In: pictures in linear light with their coverage, and paths. Out: PNG files with sRGB-encoded colors and straight alpha.
+//! In: pictures in linear light with coverage, and paths. Out: PNG files, sRGB-encoded with straight alpha.
 
 use crate::plugin::testing::readback::HalfPicture;
 use crate::plugin::testing::{TestingError, save};
@@ -87,7 +87,8 @@ fn write_all(waiting: &Mutex<Receiver<Picture>>, failed: &Mutex<Option<TestingEr
     }
 }
 
-/// Converts linear light times coverage to sRGB-encoded colors with straight alpha: the color is divided by the coverage before it is encoded. Colors without coverage are black.
+/// Converts linear light times coverage to sRGB-encoded colors with straight alpha: colors are divided by the coverage,
+/// then encoded. Colors without coverage are black.
 fn straight(picture: &Rgba32FImage) -> RgbaImage {
     let byte = |value: f32| (value.clamp(0.0, 1.0) * 255.0).round() as u8;
     RgbaImage::from_fn(picture.width(), picture.height(), |x, y| {

@@ -1,15 +1,15 @@
 //! The state of every camera that may see captures, kept from frame to frame.
 //!
-//! In: the captures that [`prepare`](super::prepare) finds for each camera. Out: [`CaptureViews`], read by drawing and statistics.
+//! In: the captures that [`prepare`](super::prepare) finds for each camera. Out: [`CaptureViews`].
 
-use super::active::ActiveLists;
-use super::composite::CompositeBindings;
-use super::kept::{IdleFrames, KeptGroup};
-use super::previous::CameraPose;
-use super::upload::GpuGaussianCapture;
-use super::write_depth::WriteDepthBindings;
 use crate::plugin::component::GaussianCapture;
-use crate::renderer::memory::Caught;
+use crate::plugin::render::captures::active::ActiveLists;
+use crate::plugin::render::captures::previous::CameraPose;
+use crate::plugin::render::captures::upload::GpuGaussianCapture;
+use crate::plugin::render::targets::bindings::{CachedGroup, IdleFrames};
+use crate::plugin::render::targets::composite::CompositeBindings;
+use crate::plugin::render::targets::write_depth::WriteDepthBindings;
+use crate::renderer::device::memory::Caught;
 use crate::renderer::{Design, Instance, Renderer, ViewRenderer};
 use crate::view::{Appearance, View};
 use bevy::asset::AssetId;
@@ -27,32 +27,32 @@ use bevy::render::sync_world::MainEntity;
 pub(crate) struct CaptureViews(pub(crate) HashMap<Entity, CaptureView>);
 
 /// Returns whether other systems change the captures' picture of any camera before it reaches the target.
-pub(super) fn any_shaded(views: Res<CaptureViews>) -> bool {
+pub(in crate::plugin::render) fn any_shaded(views: Res<CaptureViews>) -> bool {
     views.0.values().any(|view| view.is_shaded)
 }
 
 /// State of one camera.
 pub(crate) struct CaptureView {
     /// The camera's entity in the main world.
-    pub(super) camera: Entity,
+    pub(in crate::plugin::render) camera: Entity,
     pub(crate) renderer: ViewRenderer,
     /// The pipeline of the composite into the camera's target; `None` if the GPU refuses it. Nothing is drawn then.
-    pub(super) composite: Option<CachedRenderPipelineId>,
+    pub(in crate::plugin::render) composite: Option<CachedRenderPipelineId>,
     /// The composite into every sample of a multisampled target.
-    pub(super) composite_samples: Option<CachedRenderPipelineId>,
+    pub(in crate::plugin::render) composite_samples: Option<CachedRenderPipelineId>,
     /// Whether the composite blends in place by hardware, instead of reading the target.
-    pub(super) in_place: bool,
-    pub(super) bindings: CompositeBindings,
+    pub(in crate::plugin::render) in_place: bool,
+    pub(in crate::plugin::render) bindings: CompositeBindings,
     /// The pipeline that writes to the camera's depth buffer, if the camera requests it.
-    pub(super) write_depth: Option<CachedRenderPipelineId>,
-    pub(super) depth_bindings: WriteDepthBindings,
+    pub(in crate::plugin::render) write_depth: Option<CachedRenderPipelineId>,
+    pub(in crate::plugin::render) depth_bindings: WriteDepthBindings,
     /// The pipeline that writes to the camera's motion vectors, if the camera has them.
-    pub(super) write_motion: Option<CachedRenderPipelineId>,
-    pub(super) motion_group: KeptGroup,
+    pub(in crate::plugin::render) write_motion: Option<CachedRenderPipelineId>,
+    pub(in crate::plugin::render) motion_group: CachedGroup,
     /// The camera's pose in the previous frame.
-    pub(super) pose: Option<CameraPose>,
+    pub(in crate::plugin::render) pose: Option<CameraPose>,
     /// Whether other systems change the captures' picture before it reaches the target, in
-    /// [`CaptureSystems::Shade`](super::CaptureSystems).
+    /// [`CaptureSystems::Shade`](crate::plugin::render::CaptureSystems).
     pub(crate) is_shaded: bool,
     /// The changed picture, which the composite uses instead of the renderer's color.
     pub(crate) shaded: Option<wgpu::TextureView>,
@@ -61,12 +61,12 @@ pub(crate) struct CaptureView {
     idle: IdleFrames,
     /// The captures that the camera sees this frame; nothing is drawn while this is empty.
     pub(crate) drawn: Vec<Drawn>,
-    /// The captures of the last frame for whose captures there was room.
+    /// The captures of the last frame in which the GPU had room for all captures in view.
     shown: Vec<MainEntity>,
-    /// Number of frames for which only the captures in `shown` are drawn: there was no room for the other captures.
+    /// Number of remaining frames in which only the captures in `shown` are drawn, for lack of room for the others.
     left_out: u32,
-    /// The errors of objects of this view that are not known yet, as in browsers. Nothing is drawn until they are known.
-    pub(super) pending: Option<Caught>,
+    /// Error scopes of this view's objects, without results yet, as in browsers. Nothing is drawn until these arrive.
+    pub(in crate::plugin::render) pending: Option<Caught>,
 }
 
 /// Number of frames after which captures for which there was no room are tried again: about a second.
@@ -84,8 +84,8 @@ pub(crate) struct Drawn {
     pub(crate) level: usize,
 }
 
-/// Moves the copies of each capture at one level next to the first copy, so that one dispatch draws all copies without a list of active
-/// Gaussians. The order is otherwise kept, since it decides between splats of the same depth.
+/// Moves the copies of each capture at one level next to the first copy, so that one dispatch draws all copies without
+/// a list of active Gaussians. The order is otherwise kept, since it decides between splats of the same depth.
 pub(crate) fn group_copies(drawn: &mut [Drawn]) {
     // Two captures are always adjacent.
     if drawn.len() < 3 {
@@ -116,7 +116,7 @@ impl Drawn {
 }
 
 impl CaptureView {
-    pub(super) fn new(device: &RenderDevice, renderer: &Renderer, camera: Entity) -> Self {
+    pub(in crate::plugin::render) fn new(device: &RenderDevice, renderer: &Renderer, camera: Entity) -> Self {
         Self {
             camera,
             renderer: ViewRenderer::new(device.wgpu_device(), renderer),
@@ -127,7 +127,7 @@ impl CaptureView {
             write_depth: None,
             depth_bindings: WriteDepthBindings::default(),
             write_motion: None,
-            motion_group: KeptGroup::default(),
+            motion_group: CachedGroup::default(),
             pose: None,
             is_shaded: false,
             shaded: None,
@@ -146,7 +146,7 @@ impl CaptureView {
     }
 
     /// Returns the captures drawn this frame, as input of the renderer.
-    pub(super) fn instances<'a>(
+    pub(in crate::plugin::render) fn instances<'a>(
         &self,
         captures: &'a RenderAssets<GpuGaussianCapture>,
         lists: &'a ActiveLists,
@@ -155,22 +155,22 @@ impl CaptureView {
     }
 
     /// Counts a frame, with or without a visible capture. After many frames without one, releases the GPU memory.
-    pub(super) fn count_idle_frames(&mut self) {
+    pub(in crate::plugin::render) fn count_idle_frames(&mut self) {
         if self.idle.count(self.sees_something()) {
             self.release();
         }
     }
 
     /// Releases the GPU memory; the next frame with a visible capture creates it again.
-    pub(super) fn release(&mut self) {
+    pub(in crate::plugin::render) fn release(&mut self) {
         self.renderer.release();
         self.bindings.forget();
         self.depth_bindings.forget();
         self.motion_group.forget();
     }
 
-    /// Counts a frame in which Bevy does not draw the camera. The view is kept: the camera may be active again in the next frame.
-    pub(super) fn pass_over(&mut self) {
+    /// Counts a frame in which Bevy does not draw the camera. The view is kept, since the camera may be active again.
+    pub(in crate::plugin::render) fn pass_over(&mut self) {
         self.drawn.clear();
         (self.is_shaded, self.shaded) = (false, None);
         self.pose = None;
@@ -178,16 +178,15 @@ impl CaptureView {
     }
 
     /// Removes the captures for which there was no room some frames ago.
-    pub(super) fn leave_out(&mut self) {
+    pub(in crate::plugin::render) fn leave_out(&mut self) {
         if self.left_out > 0 && !self.retain_shown() {
             self.left_out = 0;
         }
         self.left_out = self.left_out.saturating_sub(1);
     }
 
-    /// Removes the captures that are new since the last frame for whose captures there was room. Returns whether fewer captures remain, and
-    /// can be prepared instead.
-    pub(super) fn leave_out_new(&mut self) -> bool {
+    /// Removes the captures that are not in `shown`. Returns whether fewer remain, which can be prepared instead.
+    pub(in crate::plugin::render) fn leave_out_new(&mut self) -> bool {
         let count = self.drawn.len();
         let fewer = self.retain_shown() && self.drawn.len() < count;
         if fewer {
@@ -196,8 +195,7 @@ impl CaptureView {
         fewer
     }
 
-    /// Keeps the captures that were drawn in the last frame for whose captures there was room. Returns false, and keeps all, if there are
-    /// none.
+    /// Removes the captures that are not in `shown`. Returns false, and removes none, if none is in `shown`.
     fn retain_shown(&mut self) -> bool {
         let Self { drawn, shown, .. } = self;
         let any = drawn.iter().any(|one| shown.contains(&one.entity));
@@ -208,7 +206,7 @@ impl CaptureView {
     }
 
     /// Records that there is room for the captures of this frame.
-    pub(super) fn note_room(&mut self) {
+    pub(in crate::plugin::render) fn note_room(&mut self) {
         if self.left_out == 0 {
             self.shown.clear();
             self.shown.extend(self.drawn.iter().map(|one| one.entity));
@@ -216,14 +214,20 @@ impl CaptureView {
     }
 
     /// Sets the design of the renderer. A change stops measuring.
-    pub(super) fn set_design(&mut self, renderer: &Renderer, design: Design) {
+    pub(in crate::plugin::render) fn set_design(&mut self, renderer: &Renderer, design: Design) {
         let before = self.renderer.design();
         self.renderer.set_design(renderer, design);
         self.measured &= self.renderer.design() == before;
     }
 
     /// Starts or stops measuring GPU times.
-    pub(super) fn measure(&mut self, on: bool, device: &RenderDevice, queue: &RenderQueue, renderer: &Renderer) {
+    pub(in crate::plugin::render) fn measure(
+        &mut self,
+        on: bool,
+        device: &RenderDevice,
+        queue: &RenderQueue,
+        renderer: &Renderer,
+    ) {
         if self.measured != on {
             self.measured = on;
             self.renderer.measure(device.wgpu_device(), queue, renderer, on);

@@ -1,20 +1,20 @@
 //! Bindings of the passes of a view, kept from frame to frame and written or created again only after a change.
 //!
-//! In: a value, or two textures, of this frame. Out: a uniform buffer with the value, [`KeptUniform`]; a bind group of the textures,
-//! [`KeptGroup`]; the number of frames without a drawn capture, [`IdleFrames`].
+//! In: a value, or two textures, of this frame. Out: a uniform buffer with the value, [`CachedUniform`]; a bind group of
+//! the textures, [`CachedGroup`]; the number of frames without a drawn capture, [`IdleFrames`].
 
-use super::logged::error_once_each;
+use crate::plugin::render::logged::error_once_each;
 use crate::renderer::WorkCounters;
-use crate::renderer::memory::catch_known;
+use crate::renderer::device::memory::catch_known;
 use bevy::render::render_resource::encase::internal::WriteInto;
 use bevy::render::render_resource::{BindGroup, BindingResource, ShaderType, UniformBuffer};
 use bevy::render::renderer::{RenderDevice, RenderQueue};
 
 /// A uniform buffer.
 #[derive(Default)]
-pub(crate) struct KeptUniform<T: ShaderType + Default>(UniformBuffer<T>);
+pub(crate) struct CachedUniform<T: ShaderType + Default>(UniformBuffer<T>);
 
-impl<T: ShaderType + WriteInto + Default + PartialEq> KeptUniform<T> {
+impl<T: ShaderType + WriteInto + Default + PartialEq> CachedUniform<T> {
     /// Writes the value if it has changed.
     pub(crate) fn set(&mut self, value: T, device: &RenderDevice, queue: &RenderQueue, work: &WorkCounters) {
         let first = self.0.buffer().is_none();
@@ -35,16 +35,16 @@ impl<T: ShaderType + WriteInto + Default + PartialEq> KeptUniform<T> {
 
 /// A bind group of two textures and of buffers that do not change.
 #[derive(Default)]
-pub(crate) struct KeptGroup(Option<([wgpu::TextureView; 2], BindGroup)>);
+pub(crate) struct CachedGroup(Option<([wgpu::TextureView; 2], BindGroup)>);
 
-impl KeptGroup {
+impl CachedGroup {
     /// Releases the textures.
     pub(crate) fn forget(&mut self) {
         self.0 = None;
     }
 
-    /// Returns the bind group of these textures. If the textures have changed, `create` makes a new one; `None` if `create` fails, or if
-    /// the GPU refuses the bind group, which is logged.
+    /// Returns the bind group of these textures. If the textures have changed, `create` makes a new one; `None` if
+    /// `create` fails, or if the GPU refuses the bind group, which is logged.
     pub(crate) fn of(
         &mut self,
         device: &RenderDevice,

@@ -1,10 +1,10 @@
 //! Previous: the poses and times of captures and cameras in the previous frame.
 //!
-//! In: the captures of each frame, kept for the next frame; the pose of a camera. Out: the view of a capture in the previous frame, from
-//! which the renderer computes the motion on the screen.
+//! In: the captures of each frame, kept for the next frame; the pose of a camera. Out: the view of a capture in the
+//! previous frame, from which the renderer computes the motion on the screen.
 //!
-//! Splats move with the time of their capture. A jump in time (a seek, the start of a loop, a cut) is no visible motion, so only the
-//! transform of the capture and the camera contribute.
+//! Splats move with the time of their capture. A jump in time (a seek, the start of a loop, a cut) is no visible
+//! motion, so only the transform of the capture and the camera contribute.
 
 use super::extract::{ExtractedCapture, ExtractedCaptures};
 use super::view::CameraLens;
@@ -22,7 +22,7 @@ const STEPS: f32 = 8.0;
 
 /// The captures of the previous frame. The memory is kept from frame to frame.
 #[derive(Resource, Default)]
-pub(super) struct PreviousCaptures(MainEntityHashMap<PreviousCapture>);
+pub(in crate::plugin::render) struct PreviousCaptures(MainEntityHashMap<PreviousCapture>);
 
 struct PreviousCapture {
     asset: AssetId<GaussianCapture>,
@@ -35,14 +35,14 @@ struct PreviousCapture {
 
 /// Pose and lens of a camera, without the jitter of temporal anti-aliasing.
 #[derive(Clone, Copy)]
-pub(super) struct CameraPose {
-    pub(super) lens: CameraLens,
-    pub(super) world_from_camera: Affine3A,
+pub(in crate::plugin::render) struct CameraPose {
+    pub(in crate::plugin::render) lens: CameraLens,
+    pub(in crate::plugin::render) world_from_camera: Affine3A,
 }
 
 impl PreviousCaptures {
     /// Keeps the captures of this frame for the next frame. Called after all views of this frame are prepared.
-    pub(super) fn keep(&mut self, extracted: &ExtractedCaptures) {
+    pub(in crate::plugin::render) fn keep(&mut self, extracted: &ExtractedCaptures) {
         self.0.retain(|entity, _| extracted.0.contains_key(entity));
         for (entity, placed) in &extracted.0 {
             let ExtractedCapture { asset, world_from_capture, seconds, .. } = *placed;
@@ -52,10 +52,10 @@ impl PreviousCaptures {
         }
     }
 
-    /// Returns the view of a capture in the previous frame. `now` is its view in this frame, `pose` the camera's pose in the previous
-    /// frame, `optics` are those of the capture, and `time_at` converts seconds to the capture's timestamp. A capture that did not exist
-    /// in the previous frame counts as unmoved.
-    pub(super) fn view(
+    /// Returns the view of a capture in the previous frame. `now` is its view in this frame, `pose` the camera's pose
+    /// in the previous frame, `optics` are those of the capture, and `time_at` converts seconds to the capture's
+    /// timestamp. A capture that did not exist in the previous frame counts as unmoved.
+    pub(in crate::plugin::render) fn view(
         &self,
         entity: &MainEntity,
         placed: &ExtractedCapture,

@@ -1,11 +1,11 @@
 //! Extract: copies the captures and the cameras' settings of this frame.
 //!
-//! In (main world): entities with a loaded capture, their transform, playback and settings; the settings of cameras. Out (render
-//! world): [`ExtractedCaptures`] and [`ExtractedViewSettings`], by entity of the main world.
+//! In (main world): entities with a loaded capture, their transform, playback and settings; the settings of cameras.
+//! Out (render world): [`ExtractedCaptures`] and [`ExtractedViewSettings`], by entity of the main world.
 
-use super::settings::{CaptureSettings, CaptureViewSettings};
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use crate::plugin::playback::{ClipFade, Playback};
+use crate::plugin::render::settings::{CaptureSettings, CaptureViewSettings};
 use crate::scene::Bounds;
 use crate::view::Appearance;
 use bevy::asset::{AssetId, Assets};
@@ -31,14 +31,14 @@ pub(crate) struct ExtractedCapture {
     pub(crate) asset: AssetId<GaussianCapture>,
     pub(crate) world_from_capture: Affine3A,
     /// The center of its bounds at this time, in world space.
-    pub(super) center: Vec3,
+    pub(in crate::plugin::render) center: Vec3,
     /// Seconds since the capture's start.
     pub(crate) seconds: f32,
     /// Whether its temporal filter is used.
     pub(crate) filtered: bool,
     pub(crate) appearance: Appearance,
-    /// Whether its Gaussians are made fainter where they are smaller on the screen than in training.
-    pub(super) antialias: bool,
+    /// Whether its Gaussians are anti-aliased; see [`CaptureSettings::antialias`].
+    pub(in crate::plugin::render) antialias: bool,
     /// The finest level of detail that is drawn.
     pub(crate) finest_level: u8,
     /// Whether any camera sees it, or may see its shadow.
@@ -69,7 +69,7 @@ type Placed = (
 );
 
 /// Returns whether a resource of the main world has changed, or been added, since the last extraction.
-pub(super) fn has_changed<R: Resource>(resource: Extract<Res<R>>) -> bool {
+pub(in crate::plugin::render) fn has_changed<R: Resource>(resource: Extract<Res<R>>) -> bool {
     resource.is_changed()
 }
 
@@ -101,14 +101,14 @@ pub(crate) fn extract_captures(
 }
 
 /// Returns whether any camera of the main world has settings, or had settings in the previous frame.
-pub(super) fn any_view_settings(
+pub(in crate::plugin::render) fn any_view_settings(
     cameras: Extract<Query<(), With<CaptureViewSettings>>>,
     extracted: Res<ExtractedViewSettings>,
 ) -> bool {
     !(cameras.is_empty() && extracted.0.is_empty())
 }
 
-pub(super) fn extract_view_settings(
+pub(in crate::plugin::render) fn extract_view_settings(
     mut extracted: ResMut<ExtractedViewSettings>,
     cameras: Extract<Query<(Entity, &CaptureViewSettings), With<Camera>>>,
 ) {

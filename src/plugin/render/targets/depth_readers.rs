@@ -1,11 +1,11 @@
 //! Depth readers: the cameras with effects that read depths after the main pass.
 //!
 //! In (main world): cameras with all their components. Out (render world): [`DepthReaders`], for which
-//! [`DepthWrite::Auto`](super::DepthWrite::Auto) writes depths.
+//! [`DepthWrite::Auto`](crate::plugin::render::DepthWrite::Auto) writes depths.
 //!
 //! Most of these effects belong to crates that this crate does not depend on; their components are found by type path.
 
-use super::settings::DepthWrite;
+use crate::plugin::render::settings::DepthWrite;
 use bevy::camera::Camera;
 use bevy::core_pipeline::oit::OrderIndependentTransparencySettings;
 use bevy::core_pipeline::prepass::MotionVectorPrepass;
@@ -18,18 +18,18 @@ use bevy::render::Extract;
 use bevy::render::sync_world::{MainEntity, MainEntityHashSet};
 use std::any::TypeId;
 
-/// Type paths of camera components whose effects read the depth buffer after the main pass. Effects that read motion vectors and
-/// order-independent transparency are found by type.
+/// Type paths of camera components whose effects read the depth buffer after the main pass. Effects that read motion
+/// vectors and order-independent transparency are found by type.
 const READERS: [&str; 2] = ["bevy_post_process::dof::DepthOfField", "bevy_light::volumetric::VolumetricFog"];
 
 /// Cameras with an effect that reads depths after the main pass.
 #[derive(Resource, Default)]
-pub(super) struct DepthReaders(MainEntityHashSet);
+pub(in crate::plugin::render) struct DepthReaders(MainEntityHashSet);
 
 impl DepthReaders {
     /// Returns the depth to write for a camera with this setting: never [`DepthWrite::Auto`].
-    pub(super) fn resolve(&self, camera: &MainEntity, asked: DepthWrite) -> DepthWrite {
-        match asked {
+    pub(in crate::plugin::render) fn resolve(&self, camera: &MainEntity, setting: DepthWrite) -> DepthWrite {
+        match setting {
             DepthWrite::Auto if self.0.contains(camera) => DepthWrite::Expected,
             DepthWrite::Auto => DepthWrite::None,
             chosen @ (DepthWrite::None | DepthWrite::Expected | DepthWrite::Median) => chosen,
@@ -38,7 +38,7 @@ impl DepthReaders {
 }
 
 /// Finds the cameras with an effect that reads depths.
-pub(super) fn extract_depth_readers(
+pub(in crate::plugin::render) fn extract_depth_readers(
     mut readers: ResMut<DepthReaders>,
     mut known: Local<[Option<TypeId>; READERS.len()]>,
     registry: Extract<Res<AppTypeRegistry>>,

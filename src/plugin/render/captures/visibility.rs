@@ -1,6 +1,6 @@
 //! Visibility: updates the bounds of each placed capture at its current time, for frustum culling.
 //!
-//! In: loaded captures and their playback. Out: an `Aabb` on each entity, in capture space, written only when it changes.
+//! In: loaded captures and their playback. Out: an `Aabb` on each entity, in capture space, written after a change.
 
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use crate::plugin::playback::Playback;
@@ -12,7 +12,7 @@ use bevy::ecs::system::{Commands, Query, Res};
 use bevy::log::debug_span;
 
 /// Updates the boxes. Runs after playback has advanced and before Bevy decides which entities a camera sees.
-pub(super) fn update_bounds(
+pub(in crate::plugin::render) fn update_bounds(
     captures: Res<Assets<GaussianCapture>>,
     mut placed: Query<(Entity, &GaussianCapture3d, &Playback, Option<&mut Aabb>)>,
     mut commands: Commands,
@@ -35,8 +35,8 @@ pub(super) fn update_bounds(
     }
 }
 
-/// Returns the box at `seconds` since the start. `None` for a capture with an environment map, which every camera sees, and for a capture
-/// without finite bounds; such captures are never culled.
+/// Returns the box at `seconds` since the start. `None` for a capture with an environment map, which every camera sees,
+/// and for a capture without finite bounds; such captures are never culled.
 fn aabb_at(capture: &GaussianCapture, seconds: f32) -> Option<Aabb> {
     if capture.scene().environment.is_some() {
         return None;

@@ -1,9 +1,9 @@
 //! Composite: draws captures over the camera's target, through Bevy's pipeline cache.
 //!
-//! In: a view target and a view's captures (color and transmittance). Out: pipeline and bind group for `shaders/composite.wgsl`, created
-//! only when one of the inputs has changed.
+//! In: a view target and a view's captures (color and transmittance). Out: pipeline and bind group for
+//! `shaders/composite.wgsl`, created only when one of the inputs has changed.
 
-use super::kept::{KeptUniform, created};
+use super::bindings::{CachedUniform, created};
 use crate::renderer::WorkCounters;
 use crate::view::BlendSpace;
 use bevy::asset::Handle;
@@ -21,19 +21,19 @@ use bevy::render::renderer::{RenderDevice, RenderQueue};
 use bevy::shader::{Shader, ShaderDefVal};
 use glam::UVec4;
 
-/// Handles of the shaders of this folder, kept in the render world so that the assets stay loaded.
+/// Handles of the shaders of captures, kept in the render world so that the assets stay loaded.
 #[derive(Resource)]
-pub(super) struct CaptureShaders {
-    pub(super) composite: Handle<Shader>,
-    pub(super) write_depth: Handle<Shader>,
-    pub(super) write_motion: Handle<Shader>,
-    /// The library that `composite.wgsl` imports. The handle is never read, but the import resolves only while it is held.
-    pub(super) _srgb: Handle<Shader>,
+pub(in crate::plugin::render) struct CaptureShaders {
+    pub(in crate::plugin::render) composite: Handle<Shader>,
+    pub(in crate::plugin::render) write_depth: Handle<Shader>,
+    pub(in crate::plugin::render) write_motion: Handle<Shader>,
+    /// The library that `composite.wgsl` imports. It is never read, but the import resolves only while it is held.
+    pub(in crate::plugin::render) _srgb: Handle<Shader>,
 }
 
 /// The parts that the pipelines for all targets share.
 #[derive(Resource)]
-pub(super) struct CompositePipeline {
+pub(in crate::plugin::render) struct CompositePipeline {
     /// Bindings of the composite in place: captures and viewport.
     layout: BindGroupLayoutDescriptor,
     reading: BindGroupLayoutDescriptor,
@@ -43,20 +43,20 @@ pub(super) struct CompositePipeline {
 
 /// The properties of a target that its pipeline depends on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(super) struct CompositeKey {
-    pub(super) format: TextureFormat,
+pub(in crate::plugin::render) struct CompositeKey {
+    pub(in crate::plugin::render) format: TextureFormat,
     /// Whether the target holds sRGB-encoded values instead of linear ones.
-    pub(super) encoded: bool,
+    pub(in crate::plugin::render) encoded: bool,
     /// The space in which captures have been blended, and are blended with the target.
-    pub(super) blend_space: BlendSpace,
-    /// Samples of the target that is written. The texture that is read has one.
-    pub(super) samples: u32,
+    pub(in crate::plugin::render) blend_space: BlendSpace,
+    /// Samples of the target that is written. A texture that is read has one sample.
+    pub(in crate::plugin::render) samples: u32,
 }
 
 impl CompositeKey {
-    /// Returns whether captures are blended in the space of the target, so that hardware blending in place is right. Otherwise the target
-    /// is read, and the result is written to another texture.
-    pub(super) fn blends_in_place(self) -> bool {
+    /// Returns whether captures are blended in the space of the target, so that hardware blending in place is right.
+    /// Otherwise the target is read, and the result is written to another texture.
+    pub(in crate::plugin::render) fn blends_in_place(self) -> bool {
         self.encoded == (self.blend_space == BlendSpace::Encoded)
     }
 
@@ -119,8 +119,8 @@ impl CompositePipeline {
 
 /// The bindings of one view. A view target alternates between two textures, so two bind groups are kept.
 #[derive(Default)]
-pub(super) struct CompositeBindings {
-    viewport: KeptUniform<UVec4>,
+pub(in crate::plugin::render) struct CompositeBindings {
+    viewport: CachedUniform<UVec4>,
     groups: Vec<CachedGroup>,
 }
 
@@ -133,12 +133,12 @@ struct CachedGroup {
 
 impl CompositeBindings {
     /// Releases the bound targets.
-    pub(super) fn forget(&mut self) {
+    pub(in crate::plugin::render) fn forget(&mut self) {
         self.groups.clear();
     }
 
     /// Writes the corner and size of the viewport in pixels of the target, if they have changed.
-    pub(super) fn set_viewport(
+    pub(in crate::plugin::render) fn set_viewport(
         &mut self,
         viewport: UVec4,
         device: &RenderDevice,
@@ -150,13 +150,13 @@ impl CompositeBindings {
 
     /// Returns the viewport's uniform, for other passes over the same view; `None` before the first
     /// [`set_viewport`](Self::set_viewport).
-    pub(super) fn viewport(&self) -> Option<BindingResource<'_>> {
+    pub(in crate::plugin::render) fn viewport(&self) -> Option<BindingResource<'_>> {
         self.viewport.binding()
     }
 
-    /// Returns the bind group that reads `captures` and, unless they are blended in place, the target texture `source`; `None` before the
-    /// first [`set_viewport`](Self::set_viewport), and if the GPU refuses the bind group.
-    pub(super) fn group(
+    /// Returns the bind group that reads `captures` and, unless they are blended in place, the target texture `source`;
+    /// `None` before the first [`set_viewport`](Self::set_viewport), and if the GPU refuses the bind group.
+    pub(in crate::plugin::render) fn group(
         &mut self,
         device: &RenderDevice,
         cache: &PipelineCache,

@@ -1,10 +1,11 @@
 //! `write_depth`: writes the depth of captures to a depth buffer, for later passes.
 //!
-//! In: a view's captures (color, transmittance, depths) and its lens. Out: pipeline and bind group for `shaders/write_depth.wgsl`, for
-//! cameras that request it with [`DepthWrite`](super::DepthWrite), and for the shadow maps of lights.
+//! In: a view's captures (color, transmittance, depths) and its lens. Out: pipeline and bind group for
+//! `shaders/write_depth.wgsl`, for cameras that request it with [`DepthWrite`](crate::plugin::render::DepthWrite), and for the shadow
+//! maps of lights.
 
+use super::bindings::{CachedGroup, CachedUniform};
 use super::composite::CaptureShaders;
-use super::kept::{KeptGroup, KeptUniform};
 use crate::renderer::WorkCounters;
 use bevy::asset::Handle;
 use bevy::core_pipeline::FullscreenShader;
@@ -44,9 +45,9 @@ pub(crate) enum WrittenDepth {
     Expected,
     /// The median depth.
     Median,
-    /// The farther of both, for shadow maps. On a slanted surface the median is the depth of the center of a splat, which may lie in front of
-    /// the surface; the expected depth, a mean of several splats, is nearer to it. In front of a surface a faint splat makes the expected
-    /// depth too small, but not the median.
+    /// The farther of the two, for shadow maps. On a slanted surface the median is the depth of the center of a splat,
+    /// which may lie in front of the surface; the expected depth, a mean of several splats, is nearer to it. In front
+    /// of a surface a faint splat makes the expected depth too small, but not the median.
     Farther,
 }
 
@@ -98,13 +99,13 @@ struct DepthLens {
 /// The bindings of one view.
 #[derive(Default)]
 pub(crate) struct WriteDepthBindings {
-    lens: KeptUniform<DepthLens>,
-    group: KeptGroup,
+    lens: CachedUniform<DepthLens>,
+    group: CachedGroup,
 }
 
 impl WriteDepthBindings {
-    /// Writes how the lens maps depth, `n0 n1 m0 m1` as in [`OpaqueDepth`](crate::renderer::OpaqueDepth), and the side of a pixel of the
-    /// captures in pixels of the depth buffer, if they have changed.
+    /// Writes how the lens maps depth, `n0 n1 m0 m1` as in [`OpaqueDepth`](crate::renderer::OpaqueDepth), and the side
+    /// of a pixel of the captures in pixels of the depth buffer, if they have changed.
     pub(crate) fn set_lens(
         &mut self,
         distance: Vec4,
@@ -116,8 +117,9 @@ impl WriteDepthBindings {
         self.lens.set(DepthLens { distance, scale }, device, queue, work);
     }
 
-    /// Returns the lens's uniform, for other passes over the same view; `None` before the first [`set_lens`](Self::set_lens).
-    pub(super) fn lens(&self) -> Option<BindingResource<'_>> {
+    /// Returns the lens's uniform, for other passes over the same view; `None` before the first
+    /// [`set_lens`](Self::set_lens).
+    pub(in crate::plugin::render) fn lens(&self) -> Option<BindingResource<'_>> {
         self.lens.binding()
     }
 

@@ -1,13 +1,13 @@
 //! Faults of cameras: the reasons why a camera cannot draw captures as it draws meshes.
 //!
-//! In: a camera's projection matrix and compositing space. Out: a [`CameraFault`], which is logged and shown in the inspector.
+//! In: a camera's projection matrix and compositing space. Out: a [`CameraFault`].
 
-use super::view::CameraLens;
+use crate::plugin::render::captures::view::CameraLens;
 use bevy::camera::CompositingSpace;
 use glam::Mat4;
 
-/// The reason why a camera cannot draw captures as it draws meshes. The text names the remedy. It is logged once and shown by the
-/// inspector.
+/// The reason why a camera cannot draw captures as it draws meshes. The text names the remedy. It is logged once and
+/// shown by the inspector.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CameraFault {
@@ -16,21 +16,21 @@ pub enum CameraFault {
     Oklab,
     /// The projection is not a supported perspective or orthographic projection.
     #[error(
-        "captures are not drawn for a camera whose projection is skewed, mirrored or not reversed in depth: use Bevy's perspective or \
-         orthographic projection, or Projection::custom with a matrix like theirs"
+        "captures are not drawn for a camera whose projection is skewed, mirrored or not reversed in depth: use Bevy's \
+         perspective or orthographic projection, or Projection::custom with a matrix like theirs"
     )]
     Projection,
     /// The depth of meshes also depends on the position in the picture.
     #[error(
-        "captures are drawn over meshes, not behind them, and write no depth, for a camera with its own near clip plane: leave \
-         PerspectiveProjection::near_clip_plane as it is, or draw captures with another camera"
+        "captures are drawn over meshes, not behind them, and write no depth, for a camera with its own near clip \
+         plane: leave PerspectiveProjection::near_clip_plane at its default, or draw captures with another camera"
     )]
     NearPlane,
 }
 
 impl CameraFault {
-    /// Returns the most severe fault of a camera with this projection matrix (`Camera::clip_from_view`) and this compositing space, if the
-    /// component is present; `None` if captures are drawn correctly.
+    /// Returns the most severe fault of a camera with this projection matrix (`Camera::clip_from_view`) and this
+    /// compositing space, if the component is present; `None` if captures are drawn correctly.
     pub fn of(clip_from_view: &Mat4, space: Option<CompositingSpace>) -> Option<Self> {
         if space == Some(CompositingSpace::Oklab) {
             return Some(Self::Oklab);

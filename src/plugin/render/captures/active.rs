@@ -1,17 +1,17 @@
-//! Active lists: the Gaussians that are active in the current segment of a temporal filter, one list per placed capture.
+//! Active lists: the Gaussians active in the current segment of a temporal filter, one list per placed capture.
 //!
-//! In: [`ExtractedCaptures`]. Out: [`ActiveLists`], shared by all cameras. A list is written on the GPU before any camera draws, and only
-//! when its capture has entered another segment.
+//! In: [`ExtractedCaptures`]. Out: [`ActiveLists`], shared by all cameras. A list is written on the GPU before any
+//! camera draws, and only when its capture has entered another segment.
 
+use super::back_off::BackOff;
 use super::detail::CaptureLevels;
 use super::extract::ExtractedCaptures;
-use super::logged::error_once_each;
-use super::renderer::CaptureRenderer;
-use super::rests::Rests;
 use super::upload::GpuGaussianCapture;
 use crate::plugin::component::GaussianCapture;
+use crate::plugin::render::logged::error_once_each;
+use crate::plugin::render::renderer::CaptureRenderer;
 use crate::renderer::ActiveList;
-use crate::renderer::memory::catch_known;
+use crate::renderer::device::memory::catch_known;
 use bevy::asset::AssetId;
 use bevy::ecs::resource::Resource;
 use bevy::ecs::system::{Res, ResMut};
@@ -21,24 +21,24 @@ use bevy::render::render_asset::RenderAssets;
 use bevy::render::renderer::{RenderContext, RenderDevice, RenderQueue};
 use bevy::render::sync_world::{MainEntity, MainEntityHashMap};
 
-/// The lists of captures with a temporal filter, by entity of the main world. A list is kept while its entity shows the same capture.
+/// The lists of captures with a temporal filter, by entity of the main world, kept while the asset is the same.
 #[derive(Resource, Default)]
 pub(crate) struct ActiveLists {
-    pub(super) placed: MainEntityHashMap<PlacedList>,
-    /// Captures for whose list there was no memory. Until they are tried again, all of their Gaussians are drawn.
-    rests: Rests<MainEntity>,
+    pub(in crate::plugin::render) placed: MainEntityHashMap<PlacedList>,
+    /// Captures for whose list there was no memory. Until the retry, all of their Gaussians are drawn.
+    back_off: BackOff<MainEntity>,
 }
 
 /// The list of one entity.
-pub(super) struct PlacedList {
-    pub(super) list: ActiveList,
+pub(in crate::plugin::render) struct PlacedList {
+    pub(in crate::plugin::render) list: ActiveList,
     asset: AssetId<GaussianCapture>,
     /// Whether the list must be rewritten for another segment.
     stale: bool,
 }
 
-/// Creates the lists of new captures, drops the lists of removed captures, and moves the remaining lists to the current segment.
-pub(super) fn prepare_active_lists(
+/// Creates the lists of new captures, drops those of removed captures, and moves the others to the current segment.
+pub(in crate::plugin::render) fn prepare_active_lists(
     device: Res<RenderDevice>,
     queue: Res<RenderQueue>,
     renderer: Option<Res<CaptureRenderer>>,
@@ -49,7 +49,7 @@ pub(super) fn prepare_active_lists(
 ) {
     let _span = debug_span!("gs4d/lists").entered();
     let Some(renderer) = renderer else { return };
-    lists.rests.count_frame();
+    lists.back_off.count_frame();
     lists.placed.retain(|entity, placed| {
         let shown = extracted.0.get(entity).filter(|shown| shown.filtered && shown.asset == placed.asset);
         let uploaded = shown.and_then(|shown| captures.get(shown.asset)?.capture());
@@ -64,7 +64,7 @@ pub(super) fn prepare_active_lists(
         let Some(uploaded) = captures.get(shown.asset) else { continue };
         let (Some(capture), Some(time)) = (uploaded.capture(), uploaded.time_at(shown.seconds)) else { continue };
         if !lists.placed.contains_key(entity) {
-            if lists.rests.contains(entity) {
+            if lists.back_off.contains(entity) {
                 continue;
             }
             let device = device.wgpu_device();
@@ -74,7 +74,7 @@ pub(super) fn prepare_active_lists(
                 Ok(None) => continue,
                 Err(failure) => {
                     error_once_each(&format!("the temporal filter of capture {} is not used: {failure}", entity.id()));
-                    lists.rests.begin(*entity);
+                    lists.back_off.begin(*entity);
                     continue;
                 }
             };
@@ -87,12 +87,12 @@ pub(super) fn prepare_active_lists(
 }
 
 /// Returns whether any list must be written.
-pub(super) fn any_stale(lists: Res<ActiveLists>) -> bool {
+pub(in crate::plugin::render) fn any_stale(lists: Res<ActiveLists>) -> bool {
     lists.placed.values().any(|placed| placed.stale)
 }
 
 /// Records `activate` for the stale lists, before the cameras.
-pub(super) fn record_active_lists(
+pub(in crate::plugin::render) fn record_active_lists(
     renderer: Option<Res<CaptureRenderer>>,
     captures: Res<RenderAssets<GpuGaussianCapture>>,
     mut lists: ResMut<ActiveLists>,

@@ -1,5 +1,5 @@
-//! `write_motion`: writes the motion of captures to the camera's motion vectors, and their depth to the depth of its prepass, for
-//! post-processing that follows pixels from frame to frame.
+//! `write_motion`: writes the motion of captures to the camera's motion vectors, and their depth to the depth of its
+//! prepass, for post-processing that follows pixels from frame to frame.
 //!
 //! In: a view's captures (motions with transmittance, depths) and its lens. Out: pipeline and bind group for
 //! `shaders/write_motion.wgsl`, for cameras with Bevy's prepass of motion vectors.
@@ -23,7 +23,7 @@ use glam::{UVec4, Vec4};
 
 /// The parts that the pipelines for all prepasses share.
 #[derive(Resource)]
-pub(super) struct WriteMotionPipeline {
+pub(in crate::plugin::render) struct WriteMotionPipeline {
     layout: BindGroupLayoutDescriptor,
     vertex: VertexState,
     shader: Handle<Shader>,
@@ -31,13 +31,13 @@ pub(super) struct WriteMotionPipeline {
 
 /// The properties of a prepass that its pipeline depends on, and the depth to write.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(super) struct WriteMotionKey {
+pub(in crate::plugin::render) struct WriteMotionKey {
     /// Samples of the prepass.
-    pub(super) samples: u32,
+    pub(in crate::plugin::render) samples: u32,
     /// Whether the median depth is written instead of the expected one.
-    pub(super) median: bool,
+    pub(in crate::plugin::render) median: bool,
     /// Whether the prepass has a depth texture.
-    pub(super) depth: bool,
+    pub(in crate::plugin::render) depth: bool,
 }
 
 impl FromWorld for WriteMotionPipeline {
@@ -80,7 +80,7 @@ impl SpecializedRenderPipeline for WriteMotionPipeline {
 
 impl WriteMotionPipeline {
     /// Creates the bind group of a view's motions and depths, its viewport and its lens.
-    pub(super) fn group(
+    pub(in crate::plugin::render) fn group(
         &self,
         device: &RenderDevice,
         cache: &PipelineCache,

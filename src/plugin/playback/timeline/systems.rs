@@ -1,11 +1,11 @@
 //! The systems that play timelines.
 //!
-//! In: loaded timelines and their players. Out: an entity for each track, with the capture, playback, fade and visibility of the track's
-//! clip at the current time.
+//! In: loaded timelines and their players. Out: an entity for each track, with the capture, playback, fade and
+//! visibility of the track's clip at the current time.
 
 use super::asset::Timeline;
 use super::clip::Clip;
-use super::player::{ClipFade, Directed, TimelinePlayer, TimelineTrack};
+use super::player::{ClipFade, PlayedClip, TimelinePlayer, TimelineTrack};
 use crate::plugin::asset::Uploads;
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use crate::plugin::playback::clock::{FollowsClock, PlaybackClock};
@@ -48,8 +48,8 @@ pub(in crate::plugin::playback) fn bind_tracks(
     }
 }
 
-/// Advances the playheads, followed players before their followers. Captures advance later: a timeline that follows a capture is one frame
-/// behind. Playback begins once the captures of all clips can be drawn.
+/// Advances the playheads, followed players before their followers. Captures advance later: a timeline that follows a
+/// capture is one frame behind. Playback begins once the captures of all clips can be drawn.
 pub(in crate::plugin::playback) fn advance_timelines(
     time: Res<Time>,
     timelines: Res<Assets<Timeline>>,
@@ -106,18 +106,18 @@ fn awaits(clip: &Clip, captures: &Assets<GaussianCapture>, uploads: &Uploads, se
 }
 
 /// Sets the clip, fade and visibility of every track's entity at the current time.
-pub(in crate::plugin::playback) fn direct_tracks(
+pub(in crate::plugin::playback) fn update_tracks(
     timelines: Res<Assets<Timeline>>,
     captures: Res<Assets<GaussianCapture>>,
     players: Query<(&TimelinePlayer, &PlaybackClock, &Children)>,
-    mut stages: Query<(&TimelineTrack, &mut Visibility, &mut ClipFade, Actor<'static>), Without<TimelinePlayer>>,
+    mut entities: Query<(&TimelineTrack, &mut Visibility, &mut ClipFade, Parts<'static>), Without<TimelinePlayer>>,
 ) {
     let _span = debug_span!("gs4d/tracks").entered();
     for (handle, clock, children) in &players {
         let Some(timeline) = timelines.get(&handle.0) else { continue };
         let time = clock.seconds;
         for &child in children {
-            let Ok((track, mut visibility, mut fade, actor)) = stages.get_mut(child) else { continue };
+            let Ok((track, mut visibility, mut fade, parts)) = entities.get_mut(child) else { continue };
             // A reload may have removed the track.
             let Some(clip) = timeline.track(&track.0).and_then(|track| track.clip_at(time)) else {
                 visibility.set_if_neq(Visibility::Hidden);
@@ -126,18 +126,18 @@ pub(in crate::plugin::playback) fn direct_tracks(
             let visible = clip.shows(time, timeline.duration_seconds());
             visibility.set_if_neq(if visible { Visibility::Inherited } else { Visibility::Hidden });
             fade.set_if_neq(ClipFade(clip.fade_at(time)));
-            cast(actor, clip, captures.get(&clip.capture));
+            set_clip(parts, clip, captures.get(&clip.capture));
         }
     }
 }
 
 /// The components that change with the clip.
-type Actor<'a> = (&'a mut Directed, &'a mut GaussianCapture3d, &'a mut Playback, &'a mut PlaybackState);
+type Parts<'a> = (&'a mut PlayedClip, &'a mut GaussianCapture3d, &'a mut Playback, &'a mut PlaybackState);
 
 /// Sets the clip of an entity if the clip has changed. `loaded` is the clip's capture, `None` until it has been loaded.
-fn cast(
-    (mut directed, mut capture, mut playback, mut state): (
-        Mut<Directed>,
+fn set_clip(
+    (mut played, mut capture, mut playback, mut state): (
+        Mut<PlayedClip>,
         Mut<GaussianCapture3d>,
         Mut<Playback>,
         Mut<PlaybackState>,
@@ -146,12 +146,12 @@ fn cast(
     loaded: Option<&GaussianCapture>,
 ) {
     let wanted = clip.playback(loaded.map(GaussianCapture::duration_seconds));
-    if directed.0.as_ref() != Some(clip) {
+    if played.0.as_ref() != Some(clip) {
         capture.set_if_neq(GaussianCapture3d(clip.capture.clone()));
         playback.set_if_neq(wanted);
         // The start of a clip is not a seek from the end of the clip before.
         *state = state.restarted();
-        directed.0 = Some(clip.clone());
+        played.0 = Some(clip.clone());
     } else if playback.offset != wanted.offset {
         // The offset depends on the capture's duration, which is unknown until the capture is loaded.
         playback.offset = wanted.offset;

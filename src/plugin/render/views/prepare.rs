@@ -1,33 +1,33 @@
 //! Prepare: collects the captures that each camera sees and prepares the renderer's working buffers.
 //!
-//! In: [`ExtractedCaptures`], Bevy's extracted cameras with their visible entities and depth textures. Out: [`CaptureViews`], with all
-//! inputs of drawing written to the GPU. In the steady state no GPU object is created.
+//! In: [`ExtractedCaptures`], Bevy's extracted cameras with their visible entities and depth textures. Out:
+//! [`CaptureViews`], with all inputs of drawing written to the GPU. In the steady state no GPU object is created.
 //!
-//! Errors of the GPU are caught, view by view. If there is no room for the captures that a camera sees, it draws the captures that it has drawn
-//! before, and tries the others again some frames later.
+//! Errors of the GPU are caught, view by view. If there is no room for the captures that a camera sees, it draws the
+//! captures that it has drawn before, and tries the others again some frames later.
 
-use super::active::ActiveLists;
 use super::capture_views::{CaptureView, CaptureViews, Drawn, group_copies};
-use super::checked_pipelines::CheckedPipelines;
-use super::composite::{CompositeKey, CompositePipeline};
-use super::depth_readers::DepthReaders;
-use super::detail::CaptureLevels;
-use super::extract::{ExtractedCaptures, ExtractedViewSettings};
 use super::fault::CameraFault;
-use super::logged::{error_once_each, warn_once_each};
-use super::previous::{CameraPose, PreviousCaptures};
 use super::publish::publish_statistics;
-use super::renderer::CaptureRenderer;
-use super::rests::Rests;
-use super::settings::{CaptureViewSettings, DepthWrite};
 use super::shade_requests::ShadeRequests;
-use super::statistics::CaptureStatistics;
-use super::upload::GpuGaussianCapture;
-use super::view::CameraLens;
-use super::write_depth::{WriteDepthKey, WriteDepthPipeline, WrittenDepth};
-use super::write_motion::{WriteMotionKey, WriteMotionPipeline};
 use crate::plugin::component::GaussianCapture3d;
-use crate::renderer::memory::{catch, catch_known};
+use crate::plugin::render::captures::active::ActiveLists;
+use crate::plugin::render::captures::back_off::BackOff;
+use crate::plugin::render::captures::detail::CaptureLevels;
+use crate::plugin::render::captures::extract::{ExtractedCaptures, ExtractedViewSettings};
+use crate::plugin::render::captures::previous::{CameraPose, PreviousCaptures};
+use crate::plugin::render::captures::upload::GpuGaussianCapture;
+use crate::plugin::render::captures::view::CameraLens;
+use crate::plugin::render::logged::{error_once_each, warn_once_each};
+use crate::plugin::render::renderer::CaptureRenderer;
+use crate::plugin::render::settings::{CaptureViewSettings, DepthWrite};
+use crate::plugin::render::statistics::CaptureStatistics;
+use crate::plugin::render::targets::checked_pipelines::CheckedPipelines;
+use crate::plugin::render::targets::composite::{CompositeKey, CompositePipeline};
+use crate::plugin::render::targets::depth_readers::DepthReaders;
+use crate::plugin::render::targets::write_depth::{WriteDepthKey, WriteDepthPipeline, WrittenDepth};
+use crate::plugin::render::targets::write_motion::{WriteMotionKey, WriteMotionPipeline};
+use crate::renderer::device::memory::{catch, catch_known};
 use crate::renderer::{ColorPrecision, GpuError, OpaqueDepth, ViewParameters};
 use crate::view::{Background, DebugView, View};
 use bevy::camera::{Camera3d, CompositingSpace, MainPassResolutionOverride};
@@ -45,7 +45,7 @@ use glam::{UVec2, UVec4};
 
 /// The captures of this frame, and the settings that decide how they are drawn.
 #[derive(SystemParam)]
-pub(super) struct Scene<'w> {
+pub(in crate::plugin::render) struct Scene<'w> {
     extracted: Res<'w, ExtractedCaptures>,
     settings: Res<'w, ExtractedViewSettings>,
     shade: Res<'w, ShadeRequests>,
@@ -58,7 +58,7 @@ pub(super) struct Scene<'w> {
 
 /// The pipelines that depend on a camera's target.
 #[derive(SystemParam)]
-pub(super) struct Pipelines<'w> {
+pub(in crate::plugin::render) struct Pipelines<'w> {
     device: Res<'w, RenderDevice>,
     cache: Res<'w, PipelineCache>,
     composite: Res<'w, CompositePipeline>,
@@ -70,7 +70,7 @@ pub(super) struct Pipelines<'w> {
 }
 
 impl Scene<'_> {
-    /// Appends the captures that a camera sees to `drawn`, in the order of Bevy's list, with copies of one level grouped.
+    /// Appends the captures that a camera sees to `drawn`, in the order of Bevy's list except for [`group_copies`].
     fn collect(
         &self,
         viewer: Entity,
@@ -109,8 +109,8 @@ impl Scene<'_> {
 }
 
 impl Pipelines<'_> {
-    /// Returns the composite pipeline for a camera's target, the one for its samples if it is multisampled, and whether they blend in
-    /// place. There is no pipeline if the GPU refuses one of them.
+    /// Returns the composite pipeline for a camera's target, the one for its samples if it is multisampled, and whether
+    /// they blend in place. There is no pipeline if the GPU refuses one of them.
     fn composite(
         &mut self,
         view: &ExtractedView,
@@ -142,7 +142,7 @@ impl Pipelines<'_> {
 }
 
 /// Lets the renderer read the depth of opaque meshes.
-pub(super) fn make_depth_readable(mut cameras: Query<&mut Camera3d>) {
+pub(in crate::plugin::render) fn make_depth_readable(mut cameras: Query<&mut Camera3d>) {
     for mut camera in &mut cameras {
         camera.depth_texture_usages.0 |= TextureUsages::TEXTURE_BINDING.bits();
     }
@@ -162,7 +162,7 @@ type CameraView = (
 type CameraItem<'a> = ROQueryItem<'a, 'a, CameraView>;
 
 /// Prepares the view of every camera: the captures it sees, its pipelines and its working buffers.
-pub(super) fn prepare_views(
+pub(in crate::plugin::render) fn prepare_views(
     device: Res<RenderDevice>,
     queue: Res<RenderQueue>,
     renderer: Option<Res<CaptureRenderer>>,
@@ -170,13 +170,13 @@ pub(super) fn prepare_views(
     mut pipelines: Pipelines,
     statistics: Res<CaptureStatistics>,
     mut views: ResMut<CaptureViews>,
-    mut rests: ResMut<Rests<Entity>>,
+    mut back_off: ResMut<BackOff<Entity>>,
     cameras: Query<CameraView, With<Camera3d>>,
     entities: &Entities,
 ) {
     let _span = debug_span!("gs4d/prepare").entered();
     let Some(renderer) = renderer else { return publish_statistics(&statistics, &views, &scene.captures) };
-    rests.count_frame();
+    back_off.count_frame();
     views.0.retain(|&camera, _| entities.contains_spawned(camera));
     for (_, view) in views.0.iter_mut().filter(|(camera, _)| !cameras.contains(**camera)) {
         view.pass_over();
@@ -193,7 +193,7 @@ pub(super) fn prepare_views(
         let entity = camera.0;
         // Requested even without captures, so that the pipeline is compiled while captures load.
         let composites = preparation.composites(&camera);
-        if rests.contains(&entity) {
+        if back_off.contains(&entity) {
             continue;
         }
         let main = camera.1.retained_view_entity.main_entity.id();
@@ -212,7 +212,7 @@ pub(super) fn prepare_views(
             // Objects of the view are invalid, so it is dropped.
             Err(failure) => {
                 error_once_each(&format!("captures are not drawn for camera {main}: {failure}"));
-                rests.begin(entity);
+                back_off.begin(entity);
             }
         }
     }
@@ -248,8 +248,8 @@ impl Preparation<'_, '_, '_> {
         self.pipelines.composite(view, camera, msaa, settings)
     }
 
-    /// Prepares the captures that a camera sees. If there is no room for all of them, prepares the captures drawn before. Nothing is drawn
-    /// while the camera's settings do not allow it, or there is no room for any of them.
+    /// Prepares the captures that a camera sees. If there is no room for all of them, prepares the captures drawn
+    /// before. Nothing is drawn while the camera's settings do not allow it, or there is no room for any of them.
     ///
     /// # Errors
     /// When the GPU refuses an object, or has no memory for it. The view must be dropped.
@@ -280,7 +280,8 @@ impl Preparation<'_, '_, '_> {
             Ok(()) => state.note_room(),
             Err(failure) if state.leave_out_new() => {
                 error_once_each(&format!(
-                    "captures that came into view of camera {} are not drawn: {failure}. Captures drawn before are still drawn",
+                    "captures that came into view of camera {} are not drawn: {failure}. Captures drawn before are \
+                     still drawn",
                     state.camera
                 ));
                 if failure.is_of_device() {
@@ -311,7 +312,7 @@ impl Preparation<'_, '_, '_> {
         lens.map(|lens| CameraPose { lens, world_from_camera: view.world_from_view.affine() })
     }
 
-    /// Prepares the collected captures, in error scopes. `poses` are the camera's poses in this frame and in the previous frame.
+    /// Prepares the collected captures, in error scopes. `poses` are the camera's, in this and in the previous frame.
     fn prepare_drawn(
         &mut self,
         state: &mut CaptureView,
@@ -323,15 +324,15 @@ impl Preparation<'_, '_, '_> {
         let (prepared, mut caught) = catch(device, bytes, || self.write(state, camera, poses));
         match caught.poll() {
             Some(result) => result?,
-            // A bind group alone is not worth a frame without captures.
+            // Only if memory was allocated, nothing is drawn until the result arrives.
             None if state.renderer.statistics().all_bytes() != bytes => state.pending = Some(caught),
             None => {}
         }
         prepared?;
         if state.renderer.is_short_of_room() {
             warn_once_each(
-                "captures are drawn whole but slowly: a camera has more pairs of splats and tiles than fit on this GPU; draw \
-                 fewer or smaller Gaussians, or a smaller picture",
+                "captures are drawn whole but slowly: a camera has more pairs of splats and tiles than fit on this \
+                 GPU; draw fewer or smaller Gaussians, or a smaller picture",
             );
         }
         if state.pending.is_some() {
@@ -388,7 +389,7 @@ impl Preparation<'_, '_, '_> {
     }
 }
 
-/// Returns the size of the picture of a camera. Meshes may be drawn at a lower resolution than the camera's, to be scaled up later.
+/// Returns the size of the picture of a camera, which may be smaller than its target, to be scaled up later.
 fn size(&(_, view, .., resolution, _): &CameraItem<'_>) -> UVec2 {
     resolution.map_or(UVec2::new(view.viewport.z, view.viewport.w), |smaller| smaller.0)
 }

@@ -1,14 +1,15 @@
-//! Pipelines of Bevy's cache that the GPU has been asked about before.
+//! Pipelines of Bevy's cache, each checked on the GPU before the cache creates it.
 //!
-//! In: a description of a pipeline for a target. Out: its identifier in the cache; `None` if this GPU refuses such a pipeline.
+//! In: a description of a pipeline for a target. Out: its identifier in the cache; `None` if this GPU refuses it.
 //!
-//! Bevy's cache creates pipelines on other threads, without error scopes: a refused pipeline would reach the error handler of the app, which
-//! ends the app. For each new key, a pipeline with the same layout and targets, and shaders that do nothing, is therefore created in error
-//! scopes first. A shader that does not compile is no such error: Bevy logs it, and nothing is drawn with it.
+//! Bevy's cache creates pipelines on other threads, without error scopes: a refused pipeline would reach the error
+//! handler of the app, which ends the app. For each new key, a pipeline with the same layout and targets, and shaders
+//! that do nothing, is therefore created in error scopes first. A shader that does not compile is no such error: Bevy
+//! logs it, and nothing is drawn with it.
 
-use super::logged::error_once_each;
+use crate::plugin::render::logged::error_once_each;
 use crate::renderer::GpuError;
-use crate::renderer::memory::catch_known;
+use crate::renderer::device::memory::catch_known;
 use bevy::ecs::resource::Resource;
 use bevy::platform::collections::HashMap;
 use bevy::render::render_resource::{
@@ -57,8 +58,8 @@ impl<S: SpecializedRenderPipeline<Key: Send + Sync> + 'static> CheckedPipelines<
                 Err(failure) => {
                     let name = descriptor.label.as_deref().unwrap_or("gs4d");
                     error_once_each(&format!(
-                        "the pass `{name}` is left out for a camera: this GPU refuses its pipeline ({failure}); use another \
-                         texture format or number of samples for the camera's target"
+                        "the pass `{name}` is left out for a camera: this GPU refuses its pipeline ({failure}); use \
+                         another texture format or number of samples for the camera's target"
                     ));
                     None
                 }

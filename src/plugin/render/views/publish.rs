@@ -3,15 +3,15 @@
 //! In: the prepared views and all uploaded captures. Out: updated [`CaptureStatistics`].
 
 use super::capture_views::CaptureViews;
-use super::statistics::CaptureStatistics;
-use super::upload::GpuGaussianCapture;
+use crate::plugin::render::captures::upload::GpuGaussianCapture;
+use crate::plugin::render::statistics::CaptureStatistics;
 use crate::renderer::ViewStatistics;
 use bevy::log::debug_span;
 use bevy::render::render_asset::RenderAssets;
 use std::borrow::Cow;
 
 /// Copies the numbers of this frame to the main world.
-pub(super) fn publish_statistics(
+pub(in crate::plugin::render) fn publish_statistics(
     statistics: &CaptureStatistics,
     views: &CaptureViews,
     captures: &RenderAssets<GpuGaussianCapture>,

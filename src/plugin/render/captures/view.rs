@@ -1,7 +1,7 @@
 //! Views: converts Bevy's camera and an entity's transform to the renderer's conventions.
 //!
-//! In: a projection matrix (Bevy's: y up, looking along −z, reverse-z), the poses of a camera and of a capture. Out: a [`CameraLens`], and
-//! a [`View`] (y down, looking along +z) that maps capture space directly to camera space.
+//! In: a projection matrix (Bevy's: y up, looking along −z, reverse-z), the poses of a camera and of a capture. Out: a
+//! [`CameraLens`], and a [`View`] (y down, looking along +z) that maps capture space directly to camera space.
 
 use crate::view::View;
 use glam::{Affine3A, DMat3, DMat4, DVec4, Mat4, UVec2, Vec2, Vec4};
@@ -10,8 +10,8 @@ use glam::{Affine3A, DMat3, DMat4, DVec4, Mat4, UVec2, Vec2, Vec4};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct CameraLens {
     rays: Rays,
-    /// How the depth buffer's value `d` gives depth in camera space: `z = (x + y d) / (z + w d)`. `None` if the depth also depends on the
-    /// position in the picture.
+    /// How the depth buffer's value `d` gives depth in camera space: `z = (x + y d) / (z + w d)`. `None` if the depth
+    /// also depends on the position in the picture.
     pub(crate) distance: Option<Vec4>,
 }
 
@@ -34,7 +34,7 @@ enum Rays {
 }
 
 impl CameraLens {
-    /// Returns the lens of a projection matrix; `None` for a matrix that is skewed, mirrored or, with parallel rays, not reversed in depth.
+    /// Returns the lens of a projection matrix; `None` if skewed, mirrored or orthographic without reversed depth.
     pub(crate) fn of(clip_from_view: &Mat4) -> Option<Self> {
         let [x, y, _, _] = columns(clip_from_view);
         if !clip_from_view.is_finite() || (x.y, y.x) != (0.0, 0.0) || x.x <= 0.0 || y.y <= 0.0 {

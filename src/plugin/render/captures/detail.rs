@@ -1,13 +1,13 @@
 //! Detail: chooses the level of detail of each capture for each camera by its size on the screen.
 //!
-//! In: extracted captures and cameras, the levels of detail of uploaded captures, [`CaptureDetail`]. Out: [`CaptureLevels`], the level of
-//! each capture for each camera. A level is kept while the size is near its limit, which avoids flicker; cameras that see a capture at
-//! nearly the same size, such as two eyes, draw the same level.
+//! In: extracted captures and cameras, the levels of detail of uploaded captures, [`CaptureDetail`]. Out:
+//! [`CaptureLevels`], the level of each capture for each camera. A level is kept while the size is near its limit,
+//! which avoids flicker; cameras that see a capture at nearly the same size, such as two eyes, draw the same level.
 
 use super::extract::ExtractedCaptures;
-use super::statistics::CaptureStatistics;
 use super::upload::GpuGaussianCapture;
 use crate::plugin::component::GaussianCapture3d;
+use crate::plugin::render::statistics::CaptureStatistics;
 use crate::scene::detail::pixels_across;
 use crate::scene::{Bounds, Level};
 use bevy::camera::{Camera3d, MainPassResolutionOverride};
@@ -27,16 +27,16 @@ use bevy::render::view::{ExtractedView, RenderVisibleEntities};
 use glam::{Affine3A, Mat4, UVec2, Vec3, Vec4};
 use std::time::Duration;
 
-/// A coarser level is chosen when the size on the screen is below this factor times its limit, and left at the limit itself.
+/// A coarser level is chosen at a size on the screen below this factor times its limit, and left at the limit itself.
 const SLACK: f32 = 0.8;
-/// Cameras draw the same level of a capture if the ratio of its sizes on their screens is at most this, as for two eyes.
+/// Cameras draw the same level of a capture if its sizes on their screens have at most this ratio, as for two eyes.
 const ALIKE: f32 = 1.1;
-/// The same ratio for cameras that drew the same level in the previous frame: larger, so that cameras that move apart do not flicker.
+/// The same ratio for cameras that drew the same level in the previous frame: larger, so that levels do not flicker.
 const STILL_ALIKE: f32 = 1.2;
 /// Change of the bias per frame while the GPU time is off target, in stops.
 const STEP: f32 = 1.0 / 64.0;
-/// The bias rises while the target time is more than this many times the measured time: a finer level has seven times as many Gaussians and
-/// must not exceed the target again.
+/// The bias rises while the target time is more than this many times the measured time: a finer level has seven times
+/// as many Gaussians and must not exceed the target again.
 const HEADROOM: f64 = 8.0;
 /// The lowest bias is minus this many stops.
 const FARTHEST: f32 = 6.0;
@@ -44,7 +44,7 @@ const FARTHEST: f32 = 6.0;
 /// The detail at which captures are drawn: a resource.
 ///
 /// Captures with levels of detail (`gs4d detail`) are drawn with fewer Gaussians where they are small on the screen.
-/// [`CaptureSettings::finest_level`](super::CaptureSettings::finest_level) limits it for one capture.
+/// [`CaptureSettings::finest_level`](crate::plugin::render::CaptureSettings::finest_level) limits the detail of one capture.
 ///
 /// # Examples
 ///
@@ -64,21 +64,21 @@ const FARTHEST: f32 = 6.0;
 #[reflect(Resource, Default, Debug, Clone, PartialEq)]
 #[type_path = "bevy_gs4d::render"]
 pub struct CaptureDetail {
-    /// Bias on the size on the screen, in stops: at −1 captures count as half as large, so that coarser levels are drawn; at 1 as twice as
-    /// large. Default: 0, as measured when the levels were made.
+    /// Bias on the size on the screen, in stops: at −1 captures count as half as large, so that coarser levels are
+    /// drawn; at 1 as twice as large. Default: 0, as measured when the levels were made.
     pub bias: f32,
-    /// Target of the GPU time of captures per frame, summed over all cameras. While it is exceeded, the bias falls slowly below
-    /// [`bias`](Self::bias); it rises again when the measured time is below an eighth of the target. Needs [`CaptureStatistics::measure`], and
-    /// a GPU with timestamps: without timestamps the target has no effect. Timestamps inside passes, which some GPUs lack, are not needed.
-    /// Default: `None`, no limit.
+    /// Target of the GPU time of captures per frame, summed over all cameras. While it is exceeded, the bias falls
+    /// slowly below [`bias`](Self::bias); it rises again when the measured time is below an eighth of the target. Needs
+    /// [`CaptureStatistics::measure`], and a GPU with timestamps: without timestamps the target has no effect.
+    /// Timestamps inside passes, which some GPUs lack, are not needed. Default: `None`, no limit.
     pub frame_time: Option<Duration>,
 }
 
 /// The level of each capture that has levels, for each camera that sees it. Level 0 is all Gaussians.
 #[derive(Resource, Default)]
-pub(super) struct CaptureLevels {
-    /// Level, and whether the capture was seen this frame, by the camera's entity in the render world and the capture's entity in the main
-    /// world.
+pub(in crate::plugin::render) struct CaptureLevels {
+    /// Level, and whether the capture was seen this frame, by the camera's entity in the render world and the capture's
+    /// entity in the main world.
     chosen: HashMap<(Entity, MainEntity), (usize, bool)>,
     /// Whether any camera draws all Gaussians of a capture.
     whole: MainEntityHashMap<bool>,
@@ -90,12 +90,12 @@ pub(super) struct CaptureLevels {
 
 impl CaptureLevels {
     /// Returns the level of a capture for a camera.
-    pub(super) fn of(&self, camera: Entity, capture: MainEntity) -> usize {
+    pub(in crate::plugin::render) fn of(&self, camera: Entity, capture: MainEntity) -> usize {
         self.chosen.get(&(camera, capture)).map_or(0, |(level, _)| *level)
     }
 
     /// Returns whether cameras see a capture, but no camera draws all of its Gaussians.
-    pub(super) fn is_coarse(&self, capture: &MainEntity) -> bool {
+    pub(in crate::plugin::render) fn is_coarse(&self, capture: &MainEntity) -> bool {
         self.whole.get(capture) == Some(&false)
     }
 
@@ -123,8 +123,8 @@ struct Sight {
 }
 
 impl Sight {
-    /// Returns the largest size and the finest previous level among all cameras that see the capture at nearly this size. They decide on
-    /// the level.
+    /// Returns the largest size and the finest previous level among all cameras that see the capture at nearly this
+    /// size: the input of [`choose`].
     fn together(&self, same_capture: &[Self]) -> (f32, Option<usize>) {
         let is_alike = |other: &&Self| {
             let ratio = if other.before == self.before && self.before.is_some() { STILL_ALIKE } else { ALIKE };
@@ -137,7 +137,7 @@ impl Sight {
     }
 }
 
-/// Returns the bias of the next frame after a frame of so many milliseconds; 0 milliseconds stands for an unmeasured frame.
+/// Returns the bias of the next frame after a frame of so many milliseconds; 0 stands for an unmeasured frame.
 fn steered(before: f32, milliseconds: f64, wanted: f64) -> f32 {
     if milliseconds > wanted {
         (before - STEP).max(-FARTHEST)
@@ -149,7 +149,10 @@ fn steered(before: f32, milliseconds: f64, wanted: f64) -> f32 {
 }
 
 /// Copies the resource to the render world.
-pub(super) fn extract_detail(mut extracted: ResMut<CaptureDetail>, detail: Extract<Res<CaptureDetail>>) {
+pub(in crate::plugin::render) fn extract_detail(
+    mut extracted: ResMut<CaptureDetail>,
+    detail: Extract<Res<CaptureDetail>>,
+) {
     *extracted = **detail;
 }
 
@@ -157,12 +160,15 @@ type CameraSize =
     (Entity, &'static ExtractedView, &'static RenderVisibleEntities, Option<&'static MainPassResolutionOverride>);
 
 /// Returns whether any capture has levels, or had levels in the previous frame.
-pub(super) fn any_levels(captures: Res<RenderAssets<GpuGaussianCapture>>, levels: Res<CaptureLevels>) -> bool {
+pub(in crate::plugin::render) fn any_levels(
+    captures: Res<RenderAssets<GpuGaussianCapture>>,
+    levels: Res<CaptureLevels>,
+) -> bool {
     !levels.chosen.is_empty() || captures.iter().any(|(_, capture)| capture.detail().is_some())
 }
 
 /// Chooses the levels of this frame.
-pub(super) fn choose_levels(
+pub(in crate::plugin::render) fn choose_levels(
     extracted: Res<ExtractedCaptures>,
     captures: Res<RenderAssets<GpuGaussianCapture>>,
     detail: Res<CaptureDetail>,
@@ -205,8 +211,8 @@ pub(super) fn choose_levels(
     levels.chosen.retain(|_, (_, seen)| *seen);
 }
 
-/// Returns the coarsest level that is accurate enough at a size on the screen. `before` is the previous level, which is kept near its
-/// limit; it is `None` if the capture was not seen in the previous frame.
+/// Returns the coarsest level that is accurate enough at a size on the screen. `before` is the previous level, which is
+/// kept near its limit; it is `None` if the capture was not seen in the previous frame.
 fn choose(levels: &[Level], pixels: f32, before: Option<usize>) -> usize {
     // NaN counts as larger than any limit.
     let fits = |level: usize, slack: f32| level == 0 || pixels <= levels[level - 1].pixels * slack;
@@ -300,8 +306,8 @@ mod tests {
         let found = seen.map(|one| one.together(&seen));
         assert_eq!(found[0], (101.0, Some(0)), "the larger size and the finer level of two eyes");
         assert_eq!(found[0], found[1], "both eyes get the same level");
-        assert_eq!(found[2], (50.0, Some(2)), "a camera farther away decides alone");
-        assert_eq!(found[3], (f32::INFINITY, None), "a camera inside the capture decides alone");
+        assert_eq!(found[2], (50.0, Some(2)), "a camera farther away shares no level");
+        assert_eq!(found[3], (f32::INFINITY, None), "a camera inside the capture shares no level");
         assert!(found[4].0.is_nan() && found[4].1 == Some(1), "NaN matches no other size: {:?}", found[4]);
     }
 

@@ -1,14 +1,15 @@
 //! Upload: copies a loaded capture to buffers on the GPU, once per asset, and again after a change or a lost device.
 //!
-//! In: [`GaussianCapture`] and the upload budget of a frame. Out: [`GpuGaussianCapture`] in `RenderAssets`, drawn once it is complete, and
-//! its state in [`Uploads`], which is sent as messages. After a change, the old version is drawn until the new one is complete, and kept if
-//! the GPU rejects the new one: if it refuses a buffer, has no memory for it, or no view could draw the capture.
+//! In: [`GaussianCapture`] and the upload budget of a frame. Out: [`GpuGaussianCapture`] in `RenderAssets`, drawn once
+//! it is complete, and its state in [`Uploads`], which is sent as messages. After a change, the old version is drawn
+//! until the new one is complete, and kept if the GPU rejects the new one: if it refuses a buffer, has no memory for
+//! it, or no view could draw the capture.
 
-use super::renderer::CaptureRenderer;
-use super::statistics::CaptureStatistics;
 use crate::plugin::asset::{CaptureFailure, Uploads};
 use crate::plugin::component::GaussianCapture;
-use crate::renderer::memory::{Caught, catch, catch_known};
+use crate::plugin::render::renderer::CaptureRenderer;
+use crate::plugin::render::statistics::CaptureStatistics;
+use crate::renderer::device::memory::{Caught, catch, catch_known};
 use crate::renderer::{CaptureUpload, GpuCapture, GpuError, Storage, ViewRenderer};
 use crate::scene::{Bounds, Level, RuntimeScene};
 use crate::view::Optics;
@@ -28,7 +29,7 @@ use std::thread::JoinHandle;
 
 /// The number of bytes of captures that may be uploaded to the GPU in one frame: a resource.
 ///
-/// A capture of 100 MB is drawn some frames after it has been loaded, and none of these frames is much longer than the others.
+/// A capture of 100 MB is drawn some frames after it has been loaded, and none of these frames is much longer.
 ///
 /// # Examples
 ///
@@ -56,10 +57,10 @@ impl Default for CaptureUploadBudget {
     }
 }
 
-/// A capture on the GPU. It is empty until the upload is complete, and if the upload failed; a failure is logged and reported.
+/// A capture on the GPU: empty until the upload is complete, and if it failed, which is logged and reported.
 pub struct GpuGaussianCapture {
     shown: Option<Arc<ShownCapture>>,
-    /// The version that will replace it.
+    /// The version that will replace `shown`.
     next: Option<NextCapture>,
 }
 
@@ -76,9 +77,10 @@ struct NextCapture {
     /// All Gaussians, then each level of detail.
     uploads: Vec<CaptureUpload<Arc<RuntimeScene>>>,
     source: GaussianCapture,
-    /// The errors of its buffers that are not known yet, as in browsers. It is not drawn before they are known.
+    /// Error scopes of the buffers, without results yet, as in browsers. Nothing is drawn until these arrive.
     pending: Option<Caught>,
-    /// The thread that compiles the passes it is drawn with. It is not drawn before they are compiled, so that no frame waits for the driver.
+    /// The thread that compiles the passes of this capture, which is not drawn before the end of the thread, so that no
+    /// frame waits for the driver.
     passes: Option<JoinHandle<()>>,
 }
 
@@ -99,14 +101,14 @@ impl NextCapture {
             Some(result) => result.map(|()| None)?,
             None => Some(caught),
         };
-        // Cameras draw a coarser level of a capture that is small on the screen, so one level is enough.
+        // Only the coarsest level must fit: cameras that see the capture small on the screen draw that level.
         let mut rooms = uploads.iter().map(|upload| ViewRenderer::check_room(device, upload.most_drawn()));
         rooms.next_back().unwrap_or(Ok(()))?;
         let passes = renderer.0.begin_ahead(device, Storage::of(&source.scene().form));
         Ok(Self { uploads, source, pending, passes })
     }
 
-    /// Returns whether it can be drawn.
+    /// Returns whether the capture can be drawn.
     fn is_complete(&self) -> bool {
         let is_compiled = self.passes.as_ref().is_none_or(JoinHandle::is_finished);
         self.bytes_left() == 0 && self.pending.is_none() && is_compiled
@@ -124,15 +126,15 @@ impl GpuGaussianCapture {
         self.level(0)
     }
 
-    /// Returns the buffers of a level of detail, or those of all Gaussians if there is no such level (0 is all Gaussians); `None` if the
-    /// capture cannot be drawn.
-    pub(super) fn level(&self, index: usize) -> Option<&GpuCapture> {
+    /// Returns the buffers of a level of detail, or those of all Gaussians if there is no such level (0 is all
+    /// Gaussians); `None` if the capture cannot be drawn.
+    pub(in crate::plugin::render) fn level(&self, index: usize) -> Option<&GpuCapture> {
         let levels = &self.shown.as_ref()?.levels;
         levels.get(index).or(levels.first())
     }
 
     /// Returns the levels of detail and the bounds over all times of the drawn capture; `None` if it has no levels.
-    pub(super) fn detail(&self) -> Option<(&[Level], Bounds)> {
+    pub(in crate::plugin::render) fn detail(&self) -> Option<(&[Level], Bounds)> {
         let source = &self.shown.as_ref()?.source;
         let levels = &source.scene().levels[..];
         (!levels.is_empty()).then_some((levels, source.bounds()?))
@@ -150,16 +152,16 @@ impl GpuGaussianCapture {
     }
 
     /// Returns the size of the buffers in bytes.
-    pub(super) fn bytes(&self) -> u64 {
+    pub(in crate::plugin::render) fn bytes(&self) -> u64 {
         self.shown.iter().flat_map(|shown| &shown.levels).map(GpuCapture::bytes).sum()
     }
 
-    /// Returns the timestamp of the drawn capture at `seconds` since its start, in its own unit of time; `None` if it cannot be drawn.
+    /// Returns the timestamp at `seconds` since the start, in the capture's unit of time; `None` if it cannot be drawn.
     pub(crate) fn time_at(&self, seconds: f32) -> Option<f32> {
         self.shown.as_ref().map(|shown| shown.source.time_at(seconds))
     }
 
-    /// Uploads at most `bytes` of the next version, and shows it once it is complete. Returns the number of uploaded bytes.
+    /// Uploads at most `bytes` of the next version, and shows it once it is complete. Returns the uploaded bytes.
     ///
     /// # Errors
     /// When the GPU has no memory for the upload, or for buffers created before. The next version is dropped.
@@ -202,14 +204,14 @@ impl GpuGaussianCapture {
     }
 
     /// Returns the bytes that remain to be uploaded; `None` if no upload is in progress.
-    pub(super) fn bytes_left(&self) -> Option<u64> {
+    pub(in crate::plugin::render) fn bytes_left(&self) -> Option<u64> {
         self.next.as_ref().map(NextCapture::bytes_left)
     }
 }
 
 impl RenderAsset for GpuGaussianCapture {
     type SourceAsset = GaussianCapture;
-    // `byte_len` is not implemented: with a byte limit per frame, Bevy removes the old upload before it prepares the new one.
+    // `byte_len` is not implemented: with a byte limit per frame, Bevy removes the old upload before the new one.
     type Param =
         (SRes<RenderDevice>, SRes<AssetServer>, SRes<Uploads>, SRes<CaptureStatistics>, Option<SRes<CaptureRenderer>>);
 
@@ -241,8 +243,8 @@ impl RenderAsset for GpuGaussianCapture {
         };
         if source.scene().trained_with.uses_fov_sentinel() {
             warn!(
-                "{}: trained with the field-of-view sentinel of intrinsics cameras; drawn with each camera's true field of \
-                 view, so it looks slightly different from its training",
+                "{}: trained with the field-of-view sentinel of intrinsics cameras; drawn with each camera's true \
+                 field of view, so it looks slightly different from its training",
                 name()
             );
         }
@@ -274,7 +276,7 @@ fn report(uploads: &Uploads, id: AssetId<GaussianCapture>, name: &str, failure: 
 }
 
 /// Copies the budget to the render world.
-pub(super) fn extract_upload_budget(
+pub(in crate::plugin::render) fn extract_upload_budget(
     mut extracted: ResMut<CaptureUploadBudget>,
     budget: Extract<Res<CaptureUploadBudget>>,
 ) {
@@ -282,12 +284,12 @@ pub(super) fn extract_upload_budget(
 }
 
 /// Returns whether any capture is being uploaded.
-pub(super) fn any_uploading(captures: Res<RenderAssets<GpuGaussianCapture>>) -> bool {
+pub(in crate::plugin::render) fn any_uploading(captures: Res<RenderAssets<GpuGaussianCapture>>) -> bool {
     captures.iter().any(|(_, capture)| capture.next.is_some())
 }
 
-/// Continues the uploads within the budget. Captures with the fewest remaining bytes come first, so that a capture shows soon.
-pub(super) fn continue_uploads(
+/// Continues the uploads within the budget, captures with the fewest remaining bytes first, so that one shows soon.
+pub(in crate::plugin::render) fn continue_uploads(
     device: Res<RenderDevice>,
     queue: Res<RenderQueue>,
     renderer: Option<Res<CaptureRenderer>>,

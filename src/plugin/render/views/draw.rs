@@ -1,17 +1,18 @@
 //! Draw: draws captures into a camera's target, in Bevy's `Core3d` schedule.
 //!
-//! In: the camera's view, prepared by [`prepare`](super::prepare), and its [`order`](super::order). Out: one compute pass, the composite
-//! and, if the camera requests it, `write_depth` and `write_motion`; then the transparent items in front. If other systems change the
-//! captures' picture before it reaches the target, the compute pass is recorded before them.
+//! In: the camera's view, prepared by [`prepare`](super::prepare), and its [`order`](super::order). Out: one compute
+//! pass, the composite and, if the camera requests it, `write_depth` and `write_motion`; then the transparent items in
+//! front. If other systems change the captures' picture before it reaches the target, the compute pass is recorded
+//! before them.
 
-use super::active::ActiveLists;
 use super::capture_views::{CaptureView, CaptureViews};
-use super::composite::CompositePipeline;
 use super::order::CaptureOrders;
-use super::renderer::CaptureRenderer;
-use super::upload::GpuGaussianCapture;
-use super::write_depth::WriteDepthPipeline;
-use super::write_motion::WriteMotionPipeline;
+use crate::plugin::render::captures::active::ActiveLists;
+use crate::plugin::render::captures::upload::GpuGaussianCapture;
+use crate::plugin::render::renderer::CaptureRenderer;
+use crate::plugin::render::targets::composite::CompositePipeline;
+use crate::plugin::render::targets::write_depth::WriteDepthPipeline;
+use crate::plugin::render::targets::write_motion::WriteMotionPipeline;
 use crate::renderer::WorkCounters;
 use bevy::camera::{MainPassResolutionOverride, Viewport};
 use bevy::core_pipeline::core_3d::Transparent3d;
@@ -41,13 +42,13 @@ pub enum CaptureSystems {
     Shade,
     /// Draws captures behind a transmissive mesh, after opaque meshes and before transmissive meshes.
     Draw,
-    /// Draws all other captures, after the transparent items behind them and before the transparent items in front of them.
+    /// Draws all other captures, after the transparent items behind them and before those in front of them.
     DrawLate,
 }
 
 /// The pipelines, and the device that creates their bind groups.
 #[derive(SystemParam)]
-pub(super) struct Passes<'w> {
+pub(in crate::plugin::render) struct Passes<'w> {
     device: Res<'w, RenderDevice>,
     cache: Res<'w, PipelineCache>,
     composite: Res<'w, CompositePipeline>,
@@ -56,7 +57,7 @@ pub(super) struct Passes<'w> {
 }
 
 /// Draws the captures of one camera into a separate picture, if other systems change it before the composite.
-pub(super) fn record_captures(
+pub(in crate::plugin::render) fn record_captures(
     camera: ViewQuery<()>,
     renderer: Option<Res<CaptureRenderer>>,
     captures: Res<RenderAssets<GpuGaussianCapture>>,
@@ -71,8 +72,8 @@ pub(super) fn record_captures(
     }
 }
 
-/// Draws the captures of one camera. Registered twice: before transmissive meshes, and after the transparent items behind captures.
-pub(super) fn draw_captures<const LATE: bool>(
+/// Draws the captures of one camera. Registered twice: before transmissive meshes, and `LATE`, among transparent items.
+pub(in crate::plugin::render) fn draw_captures<const LATE: bool>(
     camera: ViewQuery<(&ViewTarget, &ViewDepthTexture, &Msaa, Option<&ViewPrepassTextures>)>,
     renderer: Option<Res<CaptureRenderer>>,
     captures: Res<RenderAssets<GpuGaussianCapture>>,
@@ -105,7 +106,7 @@ pub(super) fn draw_captures<const LATE: bool>(
 }
 
 /// Draws the transparent items in front of the captures of one camera, as Bevy's own pass does.
-pub(super) fn draw_front(
+pub(in crate::plugin::render) fn draw_front(
     world: &World,
     camera: ViewQuery<(
         &ExtractedCamera,
@@ -142,7 +143,7 @@ pub(super) fn draw_front(
 }
 
 impl Passes<'_> {
-    /// Returns whether the view has captures and its composite is compiled. Without the composite, captures would not be visible.
+    /// Returns whether the view has captures and its composite, without which they would not be visible, is compiled.
     fn can_draw(&self, view: &CaptureView) -> bool {
         let mut composites = view.composite.into_iter().chain(view.composite_samples);
         let is_visible = view.sees_something() && view.composite.is_some();
@@ -166,7 +167,7 @@ impl Passes<'_> {
         span.end(context.command_encoder());
     }
 
-    /// Draws captures over the target; with `into_samples` over each of its samples, so that later passes can resolve the samples again.
+    /// Draws captures over the target; with `into_samples` over each sample, so that later passes can resolve them.
     fn composite(
         &self,
         view: &mut CaptureView,
@@ -175,10 +176,10 @@ impl Passes<'_> {
         context: &mut RenderContext,
         work: &WorkCounters,
     ) {
-        // Fetched before `post_process_write` swaps the target's textures: afterwards the other texture must be written.
         let id = if into_samples { view.composite_samples } else { view.composite };
         let Some(pipeline) = id.and_then(|id| self.cache.get_render_pipeline(id)) else { return };
         let Some(color) = view.shaded.as_ref().or(view.renderer.color()) else { return };
+        // The texture to read, before `post_process_write` swaps the target's textures.
         let source = (!view.in_place).then(|| target.main_texture_view());
         let group = view.bindings.group(&self.device, &self.cache, &self.composite, source, color, work);
         let Some(group) = group else { return };
@@ -193,7 +194,7 @@ impl Passes<'_> {
                 ops: Operations { load: LoadOp::Load, store: StoreOp::Store },
             },
             (false, true) => {
-                // Both textures use the same samples: the texture that is read is kept, and the samples are resolved into the other one.
+                // Both textures have the same samples, which are resolved into the texture that is not read.
                 target.post_process_write();
                 target.get_color_attachment()
             }
