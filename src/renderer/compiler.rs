@@ -2,10 +2,10 @@
 //!
 //! In: the name of a pass, its definitions and its groups. Out: a pipeline; an error if the device refuses it.
 
-use super::bind::pipeline;
-use super::error::GpuError;
+use super::device::GpuError;
+use super::device::bind::pipeline;
+use super::device::memory::catch_known;
 use super::layouts::Layouts;
-use super::memory::catch_known;
 use super::shaders::{COPIED_INSTANCE, SHADERS, SUBGROUPS_OF_32, ShaderChecks, Storage};
 use std::sync::Arc;
 

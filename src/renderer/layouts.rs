@@ -2,7 +2,7 @@
 //!
 //! In: a device. Out: [`Layouts`], in the order of the shaders' bindings.
 
-use super::bind::{Bind, group_layout};
+use super::device::bind::{Bind, group_layout};
 use super::global_sort::SortLayouts;
 use super::layout;
 use super::shaders::{Pixels, Storage};

@@ -43,42 +43,33 @@
 //! again, other views use the global sort from a number of splats on. Hardware has no such limit.
 
 mod active;
-pub(crate) mod bind;
 mod capture;
 mod compiler;
 mod compiling;
-mod design;
-mod device;
-mod error;
+pub(crate) mod device;
+pub(crate) mod frame;
 pub(crate) mod global_sort;
 mod headless;
 mod iterations;
 pub(crate) mod layout;
 mod layouts;
-pub(crate) mod memory;
 mod passes;
 mod pipelines;
-mod quiet;
-mod recording;
 pub(crate) mod shaders;
 mod statistics;
 pub(crate) mod tile_bins;
 mod timing;
 pub(crate) mod view;
 mod wgsl;
-mod work;
 
 pub use active::ActiveList;
 pub use capture::{CaptureUpload, GpuCapture};
-pub use design::Design;
-pub use device::GpuContext;
-pub use error::GpuError;
+pub use device::{GpuContext, GpuError, WorkCounters, silence_wayland};
+pub use frame::{Design, Instance, OpaqueDepth, ViewParameters};
 pub(crate) use global_sort::FinishedFrame;
 pub use headless::Headless;
 pub use pipelines::Renderer;
-pub use quiet::silence_wayland;
 pub use shaders::{ColorPrecision, ShaderChecks, Storage};
 pub use statistics::ViewStatistics;
 pub use timing::{PassTime, Timings};
-pub use view::{Instance, OpaqueDepth, ViewParameters, ViewRenderer};
-pub use work::WorkCounters;
+pub use view::ViewRenderer;

@@ -3,12 +3,13 @@
 //! In: a device, bind group layouts, the variants that a view draws with. Out: pipelines; an error if the device refuses one, which is not kept.
 
 use super::compiler::Compiler;
-use super::design::Design;
-use super::error::GpuError;
+use super::device::GpuError;
+use super::frame::Design;
 use super::global_sort::{AtOnce, SortPasses};
 use super::layouts::Layouts;
 use super::shaders::{BINNED, ColorPrecision, ShaderChecks, Storage};
-use super::tile_bins::{BinPasses, BinVariant, Blending, Lists};
+use super::tile_bins::{BinPasses, BinVariant, Lists};
+use crate::renderer::frame::Blending;
 use std::sync::{Arc, OnceLock};
 
 /// The passes of a device, shared with the thread that compiles in the background.

@@ -2,17 +2,18 @@
 //!
 //! In: a device. Out: the compiled passes, and the bind group layouts of the passes, for the buffers of views and captures.
 
-use super::bind::pipeline;
 use super::compiling::Compiling;
-use super::design::Design;
-use super::error::GpuError;
+use super::device::GpuError;
+use super::device::WorkCounters;
+use super::device::bind::pipeline;
+use super::device::memory::Allocator;
+use super::frame::Design;
 use super::layout::INSTANCES_BOUND;
 use super::layouts::Layouts;
-use super::memory::Allocator;
 use super::passes::Passes;
 use super::shaders::{ColorPrecision, SHADERS, ShaderChecks, Storage};
-use super::tile_bins::{Blending, Scratch};
-use super::work::WorkCounters;
+use super::tile_bins::Scratch;
+use crate::renderer::frame::Blending;
 use std::sync::Arc;
 use std::thread::JoinHandle;
 

@@ -3,7 +3,7 @@
 //! In: the name of a pass. Out: its WGSL text, or a wgpu shader module. The files are compiled into the binary. [`SHADERS`] has the passes of the
 //! renderer; other modules have sets of their own, which import the same libraries.
 
-use super::error::GpuError;
+use super::device::GpuError;
 use super::wgsl::{Library, composed};
 use crate::scene::{Form, PackedColors, PackedScene};
 

@@ -2,7 +2,7 @@
 //!
 //! In: a device with timestamps. Out: the intervals between timestamps; [`Timings`], medians over many frames, views and times.
 
-use super::memory::Allocator;
+use super::device::memory::Allocator;
 use crate::view::Counts;
 use std::sync::atomic::{AtomicU32, Ordering};
 

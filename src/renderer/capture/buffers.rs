@@ -4,7 +4,7 @@
 //! shader's bindings, which are filled in chunks. Packed scenes are uploaded without unpacking.
 
 use crate::gaussian::Gaussian;
-use crate::renderer::memory::Allocator;
+use crate::renderer::device::memory::Allocator;
 use crate::scene::packed::{BLOCK, BLOCK_RANGES, COLOR_WORDS, RECORD_WORDS, SHARED_RANGES};
 use crate::scene::{ActiveSets, CodedColors, Environment, Form, RuntimeScene, TemporalFilter};
 use std::ops::Range;

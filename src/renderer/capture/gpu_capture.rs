@@ -7,9 +7,9 @@
 use super::buffers::{self, Filling};
 use crate::gaussian::ShDirection;
 use crate::gaussian::harmonics::evaluated;
-use crate::renderer::error::GpuError;
+use crate::renderer::device::GpuError;
+use crate::renderer::device::memory::{Allocator, binding_limit};
 use crate::renderer::layout::{self, BLOCK, InstanceUniforms};
-use crate::renderer::memory::{Allocator, binding_limit};
 use crate::renderer::pipelines::Renderer;
 use crate::renderer::shaders::Storage;
 use crate::scene::filter::segment_of;

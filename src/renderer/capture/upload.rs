@@ -5,7 +5,7 @@
 
 use super::buffers::Filling;
 use super::gpu_capture::GpuCapture;
-use crate::renderer::error::GpuError;
+use crate::renderer::device::GpuError;
 use crate::renderer::pipelines::Renderer;
 use crate::scene::RuntimeScene;
 use std::borrow::Borrow;

@@ -3,11 +3,11 @@
 //! In: the sizes of a view. Out: [`SortBuffers`], for pictures of any size up to [`Sizes::picture`].
 
 use super::finished::PassBuffers;
+use crate::renderer::device::memory::Allocator;
+use crate::renderer::frame::{Preparation, Sizes};
 use crate::renderer::layout::{
     self, BLOCK, Counters, DEPTH_STEPS, DIGIT_BITS, DIGITS, INSTANCE_STRIDE, SortStep, SplatRecord,
 };
-use crate::renderer::memory::Allocator;
-use crate::renderer::view::{Preparation, Sizes};
 use crate::view::tiles;
 use glam::UVec2;
 use std::num::NonZeroU64;

@@ -3,9 +3,9 @@
 //! In: a device, the variants that a view draws with. Out: pipelines; an error if the device refuses one, which is not kept.
 
 use super::at_once::AtOnce;
-use crate::renderer::bind::pipeline;
 use crate::renderer::compiler::Compiler;
-use crate::renderer::error::GpuError;
+use crate::renderer::device::GpuError;
+use crate::renderer::device::bind::pipeline;
 use crate::renderer::shaders::{Pixels, Storage};
 use std::sync::{Arc, OnceLock};
 

@@ -5,8 +5,8 @@
 use super::at_once::AtOnce;
 use super::buffers::SortBuffers;
 use super::passes::StepPasses;
+use crate::renderer::frame::Recording;
 use crate::renderer::layout::{BLOCK, DEPTH_STEPS, DIGITS, INSTANCE_STRIDE};
-use crate::renderer::recording::Recording;
 use crate::renderer::shaders::Pixels;
 use crate::view::tiles;
 

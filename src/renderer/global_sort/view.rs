@@ -5,13 +5,13 @@
 use super::at_once::{AtOnce, at_once};
 use super::buffers::SortBuffers;
 use super::finished::PassBuffers;
-use crate::renderer::design::Design;
-use crate::renderer::error::GpuError;
+use crate::renderer::device::GpuError;
+use crate::renderer::frame::Blending;
+use crate::renderer::frame::Design;
+use crate::renderer::frame::Recording;
+use crate::renderer::frame::{Preparation, Sizes, ViewDesign};
 use crate::renderer::layout::Counters;
-use crate::renderer::recording::Recording;
 use crate::renderer::shaders::Pixels;
-use crate::renderer::tile_bins::Blending;
-use crate::renderer::view::{Preparation, Sizes, ViewDesign};
 use wgpu::{BindGroup, BindingResource, ComputePass};
 
 /// The global sort of a view.

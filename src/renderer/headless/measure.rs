@@ -7,10 +7,11 @@ use super::render::{Headless, instance, texel_bytes};
 use crate::renderer::active::ActiveList;
 use crate::renderer::capture::GpuCapture;
 use crate::renderer::device::GpuContext;
-use crate::renderer::error::GpuError;
-use crate::renderer::memory::with_room;
+use crate::renderer::device::GpuError;
+use crate::renderer::device::memory::with_room;
+use crate::renderer::frame::ViewParameters;
 use crate::renderer::timing::{PassTime, PassTimer, Timings, median};
-use crate::renderer::view::{ViewParameters, ViewRenderer};
+use crate::renderer::view::ViewRenderer;
 use crate::view::{Background, Counts, View};
 use std::time::{Duration, Instant};
 

@@ -5,16 +5,17 @@
 
 use crate::renderer::active::ActiveList;
 use crate::renderer::capture::GpuCapture;
-use crate::renderer::design::Design;
 use crate::renderer::device::GpuContext;
-use crate::renderer::error::GpuError;
+use crate::renderer::device::GpuError;
+use crate::renderer::device::WorkCounters;
+use crate::renderer::device::memory::{Allocator, require_texture, with_room};
+use crate::renderer::frame::Design;
+use crate::renderer::frame::{Instance, ViewParameters, max_pairs};
 use crate::renderer::global_sort::FinishedFrame;
 use crate::renderer::layout::Counters;
-use crate::renderer::memory::{Allocator, require_texture, with_room};
 use crate::renderer::pipelines::Renderer;
 use crate::renderer::shaders::{ColorPrecision, ShaderChecks, Storage};
-use crate::renderer::view::{Instance, ViewParameters, ViewRenderer, max_pairs};
-use crate::renderer::work::WorkCounters;
+use crate::renderer::view::ViewRenderer;
 use crate::scene::{RuntimeScene, TemporalFilter};
 use crate::view::{Appearance, Background, Counts, Frame, Picture, View};
 use glam::{UVec2, Vec3};

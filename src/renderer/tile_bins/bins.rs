@@ -3,7 +3,7 @@
 //! In: the size of a picture, the number of Gaussians. Out: the size of bins in tiles, their initial capacity, the variants of the passes.
 
 use super::variant::FEW_BINS_LIMIT;
-use crate::renderer::view::Instance;
+use crate::renderer::frame::Instance;
 use crate::view::tiles;
 use glam::UVec2;
 

@@ -4,8 +4,8 @@
 
 use super::bins::{SIDES, bin_grid};
 use super::scratch::{Claim, ScratchBuffers};
+use crate::renderer::frame::{Preparation, Sizes};
 use crate::renderer::layout::BIN_COUNTERS;
-use crate::renderer::view::{Preparation, Sizes};
 use crate::view::tiles;
 use std::cell::Cell;
 use wgpu::{BindGroup, BindingResource, BufferUsages};

@@ -2,8 +2,9 @@
 //!
 //! In: a device. Out: [`BinLayouts`], in the order of the shaders' bindings.
 
-use crate::renderer::bind::Bind::{self, Read, Uniform, UniformAt, Write};
-use crate::renderer::bind::group_layout;
+use crate::renderer::device::bind::Bind;
+use crate::renderer::device::bind::Bind::{Read, Uniform, UniformAt, Write};
+use crate::renderer::device::bind::group_layout;
 use crate::renderer::layout::{FrameUniforms, INSTANCES_BOUND, MotionUniforms};
 
 /// Bind group layouts, in the order of the shaders' bindings.

@@ -45,5 +45,5 @@ pub(super) use loops::is_always_complete;
 pub(super) use passes::BinPasses;
 pub(super) use scratch::Scratch;
 pub(super) use variant::BinVariant;
-pub use variant::{Blending, COUNTED, EIGHT_AT_ONCE, FEW_BINS, LARGE_BATCHES, Lists, OPAQUE};
+pub use variant::{COUNTED, EIGHT_AT_ONCE, FEW_BINS, LARGE_BATCHES, Lists, OPAQUE};
 pub(super) use view::TileBins;

@@ -4,7 +4,7 @@
 
 use super::variant::BinVariant;
 use crate::renderer::compiler::Compiler;
-use crate::renderer::error::GpuError;
+use crate::renderer::device::GpuError;
 use crate::renderer::shaders::Storage;
 use std::sync::{Arc, OnceLock};
 

@@ -10,7 +10,7 @@
 use super::bins::per_thread;
 use super::buffers::BinBuffers;
 use super::state::BinState;
-use crate::renderer::recording::Recording;
+use crate::renderer::frame::Recording;
 use crate::renderer::shaders::Storage;
 
 /// Returns the number of splats per workgroup of `colors`, four threads per splat: `SPLATS` of the shader.

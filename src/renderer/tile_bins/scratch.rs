@@ -5,9 +5,9 @@
 //! uses them.
 
 use super::stamps::stamp_round;
+use crate::renderer::device::memory::Allocator;
+use crate::renderer::frame::Sizes;
 use crate::renderer::layout::{SplatShape, VisibleSplat};
-use crate::renderer::memory::Allocator;
-use crate::renderer::view::Sizes;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 use wgpu::BufferUsages;

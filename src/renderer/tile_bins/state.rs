@@ -6,8 +6,8 @@
 use super::bins::bin_grid;
 use super::stamps::stamp;
 use super::variant::BinVariant;
+use crate::renderer::frame::Sizes;
 use crate::renderer::layout::Counters;
-use crate::renderer::view::Sizes;
 use glam::UVec2;
 
 /// The bins of a view: of the frame prepared last, unless something else is said.

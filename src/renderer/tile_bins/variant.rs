@@ -3,6 +3,7 @@
 //! In: the limits of a device, the number of Gaussians, the targets and surfaces of a view. Out: [`BinVariant`], and the shader definitions of
 //! its passes.
 
+use crate::renderer::frame::Blending;
 use crate::renderer::shaders::{ColorPrecision, Pixels};
 
 /// Capacity of the list of splats that `sort_bins` sorts in workgroup memory. With a small capacity, more workgroups run at the same time;
@@ -69,55 +70,6 @@ pub const LARGE_BATCHES: &[&str] = &["LARGE_BATCHES"];
 /// Definitions of `blend_blocks` for small pictures with [`Blending::Color`] and [`Blending::ColorBehindSurfaces`]: each thread processes more
 /// splats of its pixel at once, since few threads run.
 pub const EIGHT_AT_ONCE: &[&str] = &["LARGE_BATCHES", "EIGHT_AT_ONCE"];
-
-/// The outputs of `blend_blocks` and the opaque surfaces that it supports. If several variants can draw a picture, the results are the same;
-/// the first is the fastest.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Blending {
-    /// Color, without opaque surfaces.
-    Color,
-    /// Color, hidden by opaque surfaces.
-    ColorBehindSurfaces,
-    /// Color, hidden by opaque surfaces with several samples per pixel.
-    ColorBehindSamples,
-    /// Color and depths, opaque surfaces, every debug view.
-    #[default]
-    All,
-    /// Color and depths, multisampled opaque surfaces, every debug view.
-    AllMultisampled,
-}
-
-impl Blending {
-    /// All kinds.
-    pub const ALL: [Self; 5] =
-        [Self::Color, Self::ColorBehindSurfaces, Self::ColorBehindSamples, Self::All, Self::AllMultisampled];
-
-    /// Returns the definitions of `blend_blocks`.
-    pub fn definitions(self) -> &'static [&'static str] {
-        match self {
-            Self::Color => &[],
-            Self::ColorBehindSurfaces => &["OPAQUE"],
-            Self::ColorBehindSamples => &["OPAQUE", "MULTISAMPLED"],
-            Self::All => &["DEPTHS"],
-            Self::AllMultisampled => &["DEPTHS", "MULTISAMPLED"],
-        }
-    }
-
-    /// Returns whether depths are written.
-    pub(in crate::renderer) fn writes_depths(self) -> bool {
-        matches!(self, Self::All | Self::AllMultisampled)
-    }
-
-    /// Returns whether splats that opaque surfaces hide are left out before they are sorted.
-    pub(in crate::renderer) fn leaves_out_hidden(self) -> bool {
-        matches!(self, Self::ColorBehindSurfaces | Self::ColorBehindSamples)
-    }
-
-    /// Returns whether the opaque depth is multisampled.
-    pub(in crate::renderer) fn is_multisampled(self) -> bool {
-        matches!(self, Self::ColorBehindSamples | Self::AllMultisampled)
-    }
-}
 
 /// The definition of `sort_bins` for bins that are counted before they are filled.
 pub const COUNTED: &[&str] = &["COUNTED"];

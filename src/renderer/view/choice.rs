@@ -3,7 +3,7 @@
 //! In: the design that the client sets, the device, the number of splats, counters of earlier frames. Out: the design of the next frame.
 
 use super::view_renderer::ViewRenderer;
-use crate::renderer::design::Design;
+use crate::renderer::frame::Design;
 use crate::renderer::layout::Counters;
 use crate::renderer::pipelines::Renderer;
 use crate::renderer::tile_bins::{self, MAX_SLOTS};

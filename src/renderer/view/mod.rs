@@ -5,19 +5,13 @@
 //! [`ViewRenderer::record`] records the frame.
 mod choice;
 mod motion;
-mod parameters;
 mod prepare;
 mod readback;
 mod record;
 mod resources;
-mod sizes;
 #[cfg(test)]
 mod tests;
 mod uniforms;
-mod view_design;
 mod view_renderer;
 
-pub use parameters::{Instance, OpaqueDepth, ViewParameters};
-pub(super) use sizes::{Sizes, max_pairs};
-pub(super) use view_design::{Preparation, ViewDesign};
 pub use view_renderer::ViewRenderer;

@@ -5,7 +5,7 @@
 //! blends them into the target. Frames without views of the previous frame have no motions.
 
 use super::resources::{Resources, pixel_group};
-use super::view_design::{Preparation, ViewDesign};
+use crate::renderer::frame::{Preparation, ViewDesign};
 use crate::renderer::layout::{
     BACKGROUND_NONE, DEBUG_COLOR, FrameUniforms, INSTANCE_STRIDE, INSTANCES_BOUND, MotionUniforms,
 };

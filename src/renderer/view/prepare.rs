@@ -3,15 +3,15 @@
 //! In: instances and [`ViewParameters`], and the counters of earlier frames. Out: a [`ViewRenderer`] that can be recorded.
 
 use super::motion::MotionResources;
-use super::parameters::{Instance, ViewParameters};
 use super::resources::{Resources, texture_bytes};
-use super::sizes::{Sizes, grown, max_pairs};
-use super::view_design::Preparation;
 use super::view_renderer::ViewRenderer;
 use crate::renderer::active::{drawn_count, most_at_once, most_drawn};
-use crate::renderer::error::GpuError;
+use crate::renderer::device::GpuError;
+use crate::renderer::device::memory::{binding_limit, require_texture};
+use crate::renderer::frame::Preparation;
+use crate::renderer::frame::{Instance, ViewParameters};
+use crate::renderer::frame::{Sizes, grown, max_pairs};
 use crate::renderer::layout::{BLOCK, Counters, SplatRecord};
-use crate::renderer::memory::{binding_limit, require_texture};
 use crate::renderer::pipelines::Renderer;
 use crate::renderer::shaders::Pixels;
 use crate::renderer::timing::{PassTime, PassTimer, WHOLE_FRAME};

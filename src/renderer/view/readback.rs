@@ -3,7 +3,7 @@
 //! In: copies recorded into a frame. Out: the copied bytes, some frames later. While a copy is in progress, no other copy is
 //! started.
 
-use crate::renderer::memory::Allocator;
+use crate::renderer::device::memory::Allocator;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// A buffer that is repeatedly filled by a copy, mapped and read.

@@ -2,10 +2,10 @@
 //!
 //! In: a prepared view and the instances for which it was prepared. Out: one compute pass, in the order of the table in [`crate::renderer`].
 
-use super::parameters::Instance;
 use super::view_renderer::ViewRenderer;
+use crate::renderer::frame::Instance;
+use crate::renderer::frame::Recording;
 use crate::renderer::pipelines::Renderer;
-use crate::renderer::recording::Recording;
 use crate::renderer::timing::PassTimer;
 
 impl ViewRenderer {

@@ -3,8 +3,8 @@
 //! In: sizes, the opaque depth and the environment map. Out: [`Resources`], which are created again only when the sizes change. Another opaque
 //! depth or environment map replaces only the bind group of the pixels.
 
-use super::sizes::Sizes;
-use super::view_design::{Preparation, ViewDesign};
+use crate::renderer::frame::Sizes;
+use crate::renderer::frame::{Preparation, ViewDesign};
 use crate::renderer::layout::{INSTANCE_STRIDE, INSTANCES_AT_ONCE, INSTANCES_BOUND};
 use crate::renderer::shaders::Pixels;
 use std::num::NonZeroU64;

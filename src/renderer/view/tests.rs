@@ -3,15 +3,17 @@
 //! In: synthetic scenes, frames with and without Gaussians, counters that the tests write. Out: proof that a frame depends on no counter and no
 //! splat of an earlier frame. Skipped where there is no GPU.
 
-use super::{Instance, OpaqueDepth, ViewParameters, ViewRenderer};
+use super::ViewRenderer;
 use crate::gaussian::{Gaussian, Harmonics};
 use crate::renderer::capture::GpuCapture;
-use crate::renderer::design::Design;
 use crate::renderer::device::GpuContext;
+use crate::renderer::frame::Blending;
+use crate::renderer::frame::Design;
+use crate::renderer::frame::{Instance, OpaqueDepth, ViewParameters};
 use crate::renderer::layout::Counters;
 use crate::renderer::pipelines::Renderer;
 use crate::renderer::shaders::ShaderChecks;
-use crate::renderer::tile_bins::{BinVariant, Blending, Lists, MAX_SLOTS, TileBins};
+use crate::renderer::tile_bins::{BinVariant, Lists, MAX_SLOTS, TileBins};
 use crate::scene::{Bounds, RuntimeScene};
 use crate::view::{Appearance, Camera, RasterFov, View};
 use depth_texture::uniform_depth;

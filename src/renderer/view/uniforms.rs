@@ -3,10 +3,10 @@
 //! In: a prepared view, its instances, its parameters and the environment map. Out: the uniform buffers of the frame, of the parts of its
 //! instances and of its motions.
 
-use super::parameters::ViewParameters;
-use super::view_design::Preparation;
 use super::view_renderer::ViewRenderer;
 use crate::renderer::active::drawn_count;
+use crate::renderer::frame::Preparation;
+use crate::renderer::frame::ViewParameters;
 use crate::renderer::layout::{self, FrameUniforms, INSTANCE_STRIDE, InstanceUniforms};
 use crate::view::{Appearance, Background, View, tiles};
 use glam::{Mat4, Vec2, Vec4};

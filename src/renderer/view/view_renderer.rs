@@ -5,8 +5,8 @@
 use super::motion::MotionResources;
 use super::readback::Readback;
 use super::resources::Resources;
-use super::view_design::ViewDesign;
-use crate::renderer::design::Design;
+use crate::renderer::frame::Design;
+use crate::renderer::frame::ViewDesign;
 use crate::renderer::global_sort::{FinishedFrame, GlobalSort};
 use crate::renderer::layout::{self, Counters};
 use crate::renderer::pipelines::Renderer;

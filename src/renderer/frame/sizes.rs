@@ -2,8 +2,8 @@
 //!
 //! In: the picture size that a frame needs, and the limits of the device. Out: [`Sizes`], by which buffers and targets are created.
 
+use crate::renderer::device::memory::binding_limit;
 use crate::renderer::layout::BLOCK;
-use crate::renderer::memory::binding_limit;
 use glam::UVec2;
 
 /// The sizes of the resources of a view.
@@ -29,7 +29,7 @@ const PICTURE_STEP: u32 = 256;
 
 /// Returns the size of targets for a picture of size `needed`, given the current size `made` of targets. `limit` is the largest side of a
 /// texture.
-pub(super) fn grown(made: UVec2, needed: UVec2, limit: u32) -> UVec2 {
+pub(in crate::renderer) fn grown(made: UVec2, needed: UVec2, limit: u32) -> UVec2 {
     // The first picture may be the only one: exact size.
     if made == UVec2::ZERO {
         return needed;

@@ -3,16 +3,16 @@
 //! In: frames that are prepared and recorded, counters of earlier frames. Out: [`ViewDesign`], which each design implements in its folder: its
 //! state from frame to frame, its buffers, its passes.
 
+use super::design::Design;
 use super::parameters::Instance;
+use super::recording::Recording;
 use super::sizes::Sizes;
-use crate::renderer::design::Design;
-use crate::renderer::error::GpuError;
+use crate::renderer::device::GpuError;
+use crate::renderer::device::memory::Allocator;
+use crate::renderer::frame::Blending;
 use crate::renderer::layout::Counters;
-use crate::renderer::memory::Allocator;
 use crate::renderer::pipelines::Renderer;
-use crate::renderer::recording::Recording;
 use crate::renderer::shaders::{Pixels, Storage};
-use crate::renderer::tile_bins::Blending;
 use std::any::Any;
 use std::fmt::Debug;
 use wgpu::{BindGroup, BindingResource, ComputePass};

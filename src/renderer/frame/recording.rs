@@ -2,19 +2,19 @@
 //!
 //! In: a prepared view and its instances. Out: dispatches over the parts of instances and over tiles, and timestamps between passes.
 
-use super::active::drawn_count;
-use super::layout::{INSTANCE_STRIDE, INSTANCES_AT_ONCE};
-use super::passes::MotionPass;
-use super::pipelines::Renderer;
-use super::shaders::Storage;
-use super::timing::PassTimer;
-use super::view::Instance;
+use crate::renderer::active::drawn_count;
+use crate::renderer::frame::Instance;
+use crate::renderer::layout::{INSTANCE_STRIDE, INSTANCES_AT_ONCE};
+use crate::renderer::passes::MotionPass;
+use crate::renderer::pipelines::Renderer;
+use crate::renderer::shaders::Storage;
+use crate::renderer::timing::PassTimer;
 use crate::view::tiles;
 use glam::UVec2;
 
 /// A frame that is recorded.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Recording<'a> {
+pub(in crate::renderer) struct Recording<'a> {
     pub renderer: &'a Renderer,
     pub instances: &'a [Instance<'a>],
     /// Size of the picture, and number of slots.
@@ -30,7 +30,7 @@ pub(super) struct Recording<'a> {
 
 impl Recording<'_> {
     /// Marks the end of a pass, if the frame is timed.
-    pub(super) fn mark(&self, pass: &mut wgpu::ComputePass<'_>) {
+    pub(in crate::renderer) fn mark(&self, pass: &mut wgpu::ComputePass<'_>) {
         if let Some(timer) = self.timer {
             timer.mark(pass);
         }
@@ -39,7 +39,7 @@ impl Recording<'_> {
     /// Records one dispatch of `project`, `project_bin` or `colors` for each part of each instance, or for several consecutive instances of
     /// the same Gaussians. `groups` returns the number of workgroups for a storage and a number of Gaussians; `pipeline` returns the pipeline
     /// for a storage and one or (`true`) several instances.
-    pub(super) fn dispatch_parts<'a>(
+    pub(in crate::renderer) fn dispatch_parts<'a>(
         &self,
         pass: &mut wgpu::ComputePass<'_>,
         pipeline: impl Fn(Storage, bool) -> Option<&'a wgpu::ComputePipeline>,
@@ -68,7 +68,7 @@ impl Recording<'_> {
     }
 
     /// Records `motion`: at most `most` workgroups for each part.
-    pub(super) fn dispatch_motion(
+    pub(in crate::renderer) fn dispatch_motion(
         &self,
         pass: &mut wgpu::ComputePass<'_>,
         motion: &MotionPass,
@@ -94,7 +94,7 @@ impl Recording<'_> {
     }
 
     /// Records a pass over pixels: a workgroup for each square of `side` x `side` tiles. `lists` are the pass's own buffers.
-    pub(super) fn dispatch_tiles(
+    pub(in crate::renderer) fn dispatch_tiles(
         &self,
         pass: &mut wgpu::ComputePass<'_>,
         pipeline: &wgpu::ComputePipeline,

@@ -1,12 +1,12 @@
 //! The parameters of a frame of a view.
 //!
 //! In: captures, cameras and surfaces. Out: [`Instance`]s and [`ViewParameters`] for
-//! [`ViewRenderer::prepare`](super::ViewRenderer::prepare).
+//! [`ViewRenderer::prepare`](crate::renderer::view::ViewRenderer::prepare).
 
 use crate::renderer::active::ActiveList;
 use crate::renderer::capture::GpuCapture;
+use crate::renderer::frame::Blending;
 use crate::renderer::shaders::ColorPrecision;
-use crate::renderer::tile_bins::Blending;
 use crate::view::{Appearance, Background, BlendSpace, DebugView, View};
 use glam::UVec2;
 
@@ -49,7 +49,7 @@ pub struct ViewParameters<'a> {
     pub precision: ColorPrecision,
     /// The view of each instance in the previous frame, in the order of the instances, with camera, transform and time of that frame. An
     /// instance without a previous view, or with another kind of lens in the previous frame, has no motion. If given,
-    /// [motions](super::ViewRenderer::motion) are computed. Default: `None`.
+    /// [motions](crate::renderer::view::ViewRenderer::motion) are computed. Default: `None`.
     pub previous: Option<&'a [View]>,
 }
 
@@ -62,7 +62,7 @@ impl Default for ViewParameters<'_> {
 
 impl ViewParameters<'_> {
     /// Returns the variant of `blend_blocks` that these parameters need.
-    pub(super) fn blending(&self) -> Blending {
+    pub(in crate::renderer) fn blending(&self) -> Blending {
         let samples = self.opaque.map_or(0, |opaque| opaque.samples);
         let color = match self.debug {
             DebugView::Color | DebugView::Active | DebugView::Lifespan | DebugView::Velocity => !self.depths,
