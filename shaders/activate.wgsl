@@ -1,7 +1,7 @@
 // activate: the indices of the Gaussians that are active in a segment of time, in ascending order.
 // In: the filter of one part of a capture, as bits or intervals. Out: the list; the host computes its length. Runs once
-// for all views, only when the segment changes. `count` counts the active Gaussians of each block, `scan` sums the counts, `store` fills
-// the list. CPU reference: src/reference/activate.rs.
+// for all views, only when the segment changes. `count` counts the active Gaussians of each block, `scan` sums the
+// counts, `store` fills the list. CPU reference: src/reference/activate.rs.
 #import gs4d::types::{Activation, FILTER_BITS}
 #import gs4d::scan::{exclusive_scan, scan_total}
 
@@ -11,7 +11,8 @@ const BLOCK: u32 = 2048u;
 @group(0) @binding(0) var<uniform> activation: Activation;
 @group(0) @binding(1) var<storage, read_write> active_list: array<u32>;
 @group(0) @binding(2) var<storage, read_write> blocks: array<u32>;
-// Bits: the words of all Gaussians, segment after segment. Intervals: first and last segment of each Gaussian, 16 bits each.
+// Bits: the words of all Gaussians, segment after segment. Intervals: first and last segment of each Gaussian, 16 bits
+// each.
 @group(1) @binding(0) var<storage, read> sets: array<u32>;
 
 fn is_active(index: u32) -> bool {

@@ -1,9 +1,10 @@
 // composite: blends the captures of a view over the current contents of the view target.
 //
-// In: the captures' color and transmittance (premultiplied, in their blend space, linear or sRGB-encoded) for the pixels of the viewport;
-// with READ_TARGET the view target. Out: the view target. Blending is done in the captures' blend space. A target in the same space is
-// blended in place. A target in the other space (linear with ENCODE_TARGET, otherwise sRGB-encoded) is read, and the result is written to
-// another texture. With KEEP_SAMPLES the mean of a pixel's samples is read; all its samples are written where there is a splat.
+// In: the captures' color and transmittance (premultiplied, in their blend space, linear or sRGB-encoded) for the
+// pixels of the viewport; with READ_TARGET the view target. Out: the view target. Blending is done in the captures'
+// blend space. A target in the same space is blended in place. A target in the other space (linear with ENCODE_TARGET,
+// otherwise sRGB-encoded) is read, and the result is written to another texture. With KEEP_SAMPLES the mean of a
+// pixel's samples is read; all its samples are written where there is a splat.
 #import gs4d::srgb
 
 // The largest half-precision number: an infinite pixel would spread through bloom.

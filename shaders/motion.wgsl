@@ -1,7 +1,7 @@
 // motion: the screen-space motion of each visible splat of one part since the previous frame.
-// In: splats, their Gaussians, the view of the previous frame. Out: motions, in pixels to the right and down. They overwrite the colors of
-// the splats, which have been blended: the last pass runs again and blends motions as it blended colors. CPU reference:
-// src/reference/motion.rs.
+// In: splats, their Gaussians, the view of the previous frame. Out: motions, in pixels to the right and down. They
+// overwrite the colors of the splats, which have been blended: the last pass runs again and blends motions as it
+// blended colors. CPU reference: src/reference/motion.rs.
 #import gs4d::types::MotionUniforms
 #import gs4d::capture::{instance, load_gaussian}
 #ifdef COPIED_INSTANCE
@@ -33,7 +33,8 @@ fn motion_of(index: u32, center: vec2<f32>) -> vec2<f32> {
     let g = load_gaussian(index);
     let mean = vec4(g.mean + g.velocity * (before.time - g.mean_t), 1.0);
     let depth = dot(before.camera_z, mean);
-    // The negated comparison is true for NaN. A Gaussian behind the near limit in the previous frame has no motion either.
+    // The negated comparison is true for NaN. A Gaussian in front of the near plane in the previous frame has no motion
+    // either.
     if !(depth > before.near) {
         return vec2(0.0);
     }

@@ -1,8 +1,8 @@
 // write_depth: writes captures to the depth buffer of a camera or a light, where their opacity is at least one half.
 //
-// In: the captures' color and transmittance (not read for the median depth), and their depths, for the pixels of the viewport. Out: depth
-// values, subject to the depth test; the same value for every sample: the expected depth, with MEDIAN the median depth, with FARTHER the
-// farther of both.
+// In: the captures' color and transmittance (not read for the median depth), and their depths, for the pixels of the
+// viewport. Out: depth values, subject to the depth test; the same value for every sample: the expected depth, with
+// MEDIAN the median depth, with FARTHER the farther of both.
 
 @group(0) @binding(0) var colors: texture_2d<f32>;
 // Camera units: x the sum of z alpha T, not divided by 1 - T; y the depth at which T falls to one half or below, 0 if

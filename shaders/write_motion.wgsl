@@ -1,8 +1,9 @@
-// write_motion: writes captures to the camera's motion vectors and, with DEPTH, to the depth of its prepass, where their opacity is at
-// least one half.
+// write_motion: writes captures to the camera's motion vectors and, with DEPTH, to the depth of its prepass, where
+// their opacity is at least one half.
 //
-// In: the captures' motions and transmittance, and their depths, for the pixels of the viewport. Out: motion vectors, as fractions of the
-// viewport to the right and down; depth values, subject to the depth test; the same values for every sample.
+// In: the captures' motions and transmittance, and their depths, for the pixels of the viewport. Out: motion vectors,
+// as fractions of the viewport to the right and down; depth values, subject to the depth test; the same values for
+// every sample.
 
 // x and y the sum of m alpha T, with m in pixels, not divided by 1 - T.
 @group(0) @binding(0) var motions: texture_2d<f32>;

@@ -1,10 +1,10 @@
 // blend: front to back over each tile of 16 x 16 pixels, one workgroup each.
-// In: tile ranges, pairs, splats, the depth of opaque surfaces, the background. Out: color and transmittance, expected and median
-// depth. Each sample of a multisampled depth hides the splats behind it in its fraction of the pixel. CPU reference:
-// src/reference/blend.rs.
+// In: tile ranges, pairs, splats, the depth of opaque surfaces, the background. Out: color and transmittance, expected
+// and median depth. Each sample of a multisampled depth hides the splats behind it in its fraction of the pixel. CPU
+// reference: src/reference/blend.rs.
 //
-// If the buffer is too small for all pairs, the lists contain the pairs of the nearest splats. After its list, a tile then searches the
-// remaining splats in depth order and blends the splats that cover it. The picture is the same.
+// If the buffer is too small for all pairs, the lists contain the pairs of the nearest splats. After its list, a tile
+// then searches the remaining splats in depth order and blends the splats that cover it. The picture is the same.
 #import gs4d::types::{Counters, SplatRecord}
 #import gs4d::records::read_splat
 #import gs4d::alpha::alpha_at
@@ -19,7 +19,8 @@ const MANY: u32 = 16u;
 #ifdef SIXTY_FOUR_AT_ONCE
 const MANY: u32 = 64u;
 #endif
-// Splats of a tile that are blended in an iteration each. With many at once, all later splats are blended in iterations of MANY.
+// Splats of a tile that are blended in an iteration each. With many at once, all later splats are blended in iterations
+// of MANY.
 const ONE_BY_ONE: u32 = 8192u;
 
 @group(1) @binding(0) var<storage, read> tile_ranges: array<vec2<u32>>;
@@ -77,7 +78,8 @@ fn blend_16(pixel: ptr<function, Pixel>, i: u32, count: u32, position: vec2<f32>
     blend_4(pixel, i + 12u, count, position);
 }
 
-// Blends MANY splats from `i` on, those below `count`. Each call is expanded, not a loop: see `AtOnce` in src/renderer/shaders.rs.
+// Blends MANY splats from `i` on, those below `count`. Each call is expanded, not a loop: see `AtOnce` in
+// src/renderer/shaders.rs.
 #ifdef SIXTEEN_AT_ONCE
 fn blend_many(pixel: ptr<function, Pixel>, i: u32, count: u32, position: vec2<f32>) {
     blend_16(pixel, i, count, position);
@@ -92,7 +94,8 @@ fn blend_many(pixel: ptr<function, Pixel>, i: u32, count: u32, position: vec2<f3
 }
 #endif
 
-// Loads the batch of the pairs from `first` to `end`, unless all pixels of the tile are finished. Returns whether the batch was loaded.
+// Loads the batch of the pairs from `first` to `end`, unless all pixels of the tile are finished. Returns whether the
+// batch was loaded.
 fn load_batch(first: u32, end: u32, thread: u32) -> bool {
     if workgroupUniformLoad(&finished) == BATCH {
         return false;
@@ -126,8 +129,8 @@ fn first_without_room() -> u32 {
     return low;
 }
 
-// Returns whether a splat covers a tile and their pair was not written. `first` is the first pair of the splat, or the largest 32-bit number
-// if the count of pairs overflowed.
+// Returns whether a splat covers a tile and their pair was not written. `first` is the first pair of the splat, or the
+// largest 32-bit number if the count of pairs overflowed.
 fn lacks_pair(slot: u32, first: u32, tile: vec2<u32>) -> bool {
     let low = splats[slot].shape.w;
     let high = splats[slot].color.w;

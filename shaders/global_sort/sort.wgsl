@@ -1,7 +1,8 @@
 // sort: one step of a stable radix sort by four bits, for any subgroup size.
 // In: keys and values. Out: both, ordered by the digit at `sort_step.shift`; equal digits keep their order. `count`
-// counts the digits of a block of 2048 keys, `scan` sums the counts of all blocks, and `scatter` ranks the keys of a block and
-// moves them. `visible` writes the number of keys that the first step kept. CPU reference: src/reference/sort.rs.
+// counts the digits of a block of 2048 keys, `scan` sums the counts of all blocks, and `scatter` ranks the keys of a
+// block and moves them. `visible` writes the number of keys that the first step kept. CPU reference:
+// src/reference/sort.rs.
 #import gs4d::types::{Counters, FrameUniforms, SortStep, INVISIBLE, SORT_SLOTS, SORT_VISIBLE}
 #import gs4d::scan::{exclusive_scan, scan_total}
 

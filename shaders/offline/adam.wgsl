@@ -1,6 +1,7 @@
 // adam: one step of the Adam optimizer; each thread updates a four-vector.
-// In: gradients summed over the views of a batch, moments, learning rates. Out: updated parameters and moments, gradients reset to zero. Values
-// from `settings.values` on keep their value, but not their moments. CPU reference: src/offline/fine_tune/adam.rs.
+// In: gradients summed over the views of a batch, moments, learning rates. Out: updated parameters and moments,
+// gradients reset to zero. Values from `settings.values` on keep their value, but not their moments. CPU reference:
+// src/offline/train/reference/adam.rs.
 #import gs4d::training::AdamUniforms
 
 const DECAY_1: f32 = 0.9;

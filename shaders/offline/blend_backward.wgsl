@@ -1,11 +1,11 @@
 // blend_backward: the gradient of a loss with respect to the splats of a view.
-// In: the inputs and outputs of `blend`, and the gradient of the loss with respect to each pixel. Out: for each pair of splat and tile, sums
-// over the pixels of the tile. `place` writes the first pair of each splat; `pairs` computes the sums of every pair, one workgroup for each
-// tile.
-// CPU reference: src/reference/blend_backward.rs; equations: section 7.1 of the 4DGS model.
+// In: the inputs and outputs of `blend`, and the gradient of the loss with respect to each pixel. Out: for each pair of
+// splat and tile, sums over the pixels of the tile. `place` writes the first pair of each splat; `pairs` computes the
+// sums of every pair, one workgroup for each tile. CPU reference: src/reference/blend_backward.rs; equations:
+// section 7.1 of the 4DGS model.
 //
-// The splats of a pixel are visited front to back, as in `blend`, so that both stop at the same splat. The color behind a splat is the
-// finished color minus the color blended so far.
+// The splats of a pixel are visited front to back, as in `blend`, so that both stop at the same splat. The color behind
+// a splat is the finished color minus the color blended so far.
 #import gs4d::alpha::{is_opaque, is_skipped, left_behind, ALPHA_MAX}
 #import gs4d::conic::exponent_at
 #import gs4d::tile::{pixel_of, tile_index}
@@ -16,15 +16,16 @@ const PIXELS: u32 = 256u;
 // Number of splats whose terms are summed at once, and number of sums per splat.
 const BATCH: u32 = 8u;
 const SUMS: u32 = 10u;
-// Number of splats that are loaded at once, a multiple of BATCH. Loading them one by one would add a memory latency for each.
+// Number of splats that are loaded at once, a multiple of BATCH. Loading them one by one would add a memory latency for
+// each.
 const CHUNK: u32 = 64u;
 
 // The color that `blend` wrote, with the background, and the transmittance.
 @group(0) @binding(7) var color: texture_2d<f32>;
 // Expected and median depth.
 @group(0) @binding(8) var depth: texture_2d<f32>;
-// SUMS values for each pair. With d from pixel to center, w = alpha T and q = alpha dL/dalpha: the sums
-// of q dx, q dy, q dx^2, q dx dy, q dy^2, q, and of w times the gradient of the pixel's red, green, blue and depth.
+// SUMS values for each pair. With d from pixel to center, w = alpha T and q = alpha dL/dalpha: the sums of q dx, q dy,
+// q dx^2, q dx dy, q dy^2, q, and of w times the gradient of the pixel's red, green, blue and depth.
 @group(1) @binding(1) var<storage, read_write> pair_gradients: array<f32>;
 // Gradient with respect to red, green, blue and opacity of each pixel.
 @group(1) @binding(2) var<storage, read> pixel_gradients: array<vec4<f32>>;

@@ -1,8 +1,8 @@
 // codebooks: training of color coefficients that are sums of codebook entries.
-// In: the codes of each Gaussian. `collect` reads the gradients of the coefficients and writes the gradients of the entries, each summed over
-// its Gaussians in a fixed order. `expand` reads the entries and writes the coefficients. The first coefficient of each Gaussian is not in
-// the codebooks.
-// CPU reference: `CodedColors::rest` of src/scene/packed/colors.rs.
+// In: the codes of each Gaussian. `collect` reads the gradients of the coefficients and writes the gradients of the
+// entries, each summed over its Gaussians in a fixed order. `expand` reads the entries and writes the coefficients. The
+// DC coefficient of each Gaussian is not in the codebooks. CPU reference: `CodedColors::rest` of
+// src/scene/packed/colors.rs.
 #import gs4d::training::TiedColors
 
 @group(0) @binding(0) var<uniform> tied: TiedColors;

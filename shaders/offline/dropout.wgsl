@@ -1,6 +1,6 @@
 // dropout: hides a random share of the Gaussians from the views of a training step.
-// In: the records that `slice` wrote of one part, the seed of the step. Out: the same records, those of the share without opacity. CPU reference:
-// src/offline/fine_tune/dropout.rs.
+// In: the records that `slice` wrote of one part, the seed of the step. Out: the same records, those of the share
+// without opacity. CPU reference: src/offline/train/reference/dropout.rs.
 #import gs4d::training::DropoutUniforms
 #import gs4d::types::GaussianRecord
 #import gs4d::random::word_of

@@ -1,8 +1,8 @@
 // environment_backward: the gradient of a loss with respect to the texels of the environment map.
-// In: the frame, the transmittance that `blend` wrote, the gradient of the loss with respect to each pixel. Out: `scatter` adds, for each value
-// of the map, transmittance times bilinear weight times gradient over the pixels in front of it, as whole numbers of STEP, so that sums do not
-// depend on their order; `gather` adds these sums to the gradients of the batch and sets them to zero.
-// CPU reference: src/offline/fine_tune/environment_backward.rs.
+// In: the frame, the transmittance that `blend` wrote, the gradient of the loss with respect to each pixel. Out:
+// `scatter` adds, for each value of the map, transmittance times bilinear weight times gradient over the pixels in
+// front of it, as multiples of 1 / STEPS, so that sums do not depend on their order; `gather` adds these sums to the
+// gradients of the batch and sets them to zero. CPU reference: src/offline/train/reference/environment_backward.rs.
 #import gs4d::types::FrameUniforms
 #import gs4d::environment::{bilinear_weight, environment_behind}
 

@@ -1,8 +1,9 @@
 // exposure: corrects the color of a picture by the exposure of its camera, before the loss.
-// In: color over the background and transmittance, the exposures of all cameras. Out: `expose` writes the corrected picture, which `loss` reads.
-// `backward` turns the gradients with respect to the corrected picture into those with respect to the drawn one, and writes sums for each tile;
-// `gather` adds these sums, and the gradient of the pull to the identity, to the gradients of the exposure. `center` moves all exposures alike, so
-// that their mean is the identity. CPU reference: src/offline/fine_tune/exposure.rs.
+// In: color over the background and transmittance, the exposures of all cameras. Out: `expose` writes the corrected
+// picture, which `loss` reads. `backward` turns the gradients with respect to the corrected picture into those with
+// respect to the drawn one, and writes sums for each tile; `gather` adds these sums, and the gradient of the pull to
+// the identity, to the gradients of the exposure. `center` moves all exposures alike, so that their mean is the
+// identity. CPU reference: src/offline/train/reference/exposure.rs.
 #import gs4d::training::ExposureUniforms
 
 const SIDE: u32 = 16u;
@@ -64,7 +65,7 @@ fn backward(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_in
         own = of_scene(textureLoad(color, pixel, 0));
         let by_own = gradient.x * row(0u) + gradient.y * row(1u) + gradient.z * row(2u);
         let behind = settings.background;
-        // With more opacity, less of the drawn color is the background's: more of it is corrected.
+        // More opacity means less background in the drawn color: a larger part of the color is corrected.
         let by_opacity = behind.w * (dot(by_own, vec4(behind.xyz, 1.0)) - dot(gradient, behind.xyz));
         pixel_gradients[index] = vec4(by_own.xyz, before.w + by_opacity);
     }

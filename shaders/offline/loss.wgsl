@@ -1,11 +1,12 @@
 // loss: the loss of a rendered picture against its training image, and the gradient with respect to each pixel.
-// In: color over the background and transmittance, the image. Out: (1 - s) L1 + s (1 - SSIM) + w mask of the view, with s the similarity
-// share and w the mask weight, and its gradient. The mask is the mean over pixels of -(1 - coverage) log(1 - opacity): it penalizes opacity
-// where the image has no coverage. `similarity` writes the derivatives of SSIM with respect to the windowed means; `gradient` convolves them
-// with the window, adds L1 and writes sums for each tile; `total` adds these to the sums of all views so far. CPU reference:
-// src/offline/fine_tune/loss.rs.
+// In: color over the background and transmittance, the image. Out: (1 - s) L1 + s (1 - SSIM) + w mask of the view, with
+// s the similarity share and w the mask weight, and its gradient. The mask is the mean over pixels of -(1 - coverage)
+// log(1 - opacity): it penalizes opacity where the image has no coverage. `similarity` writes the derivatives of SSIM
+// with respect to the windowed means; `gradient` convolves them with the window, adds L1 and writes sums for each tile;
+// `total` adds these to the sums of all views so far. CPU reference: src/offline/train/reference/loss.rs.
 //
-// SSIM: 11 x 11 Gaussian window of deviation 1.5, zeros beyond the border, channel by channel, mean over pixels and channels.
+// SSIM: 11 x 11 Gaussian window of deviation 1.5, zeros beyond the border, channel by channel, mean over pixels and
+// channels.
 #import gs4d::training::LossUniforms
 
 const RADIUS: u32 = 5u;
@@ -19,11 +20,13 @@ const MARGIN: f32 = 1e-6;
 
 @group(0) @binding(0) var<uniform> loss: LossUniforms;
 @group(0) @binding(1) var color: texture_2d<f32>;
-// For each pixel and channel: derivatives of SSIM with respect to the mean, the mean square and the mean product with the image; SSIM.
+// For each pixel and channel: derivatives of SSIM with respect to the mean, the mean square and the mean product with
+// the image; SSIM.
 @group(0) @binding(2) var<storage, read_write> slopes: array<vec4<f32>>;
 // Gradient with respect to red, green, blue and opacity of each pixel.
 @group(0) @binding(3) var<storage, read_write> pixel_gradients: array<vec4<f32>>;
-// For each tile: sums of the absolute difference, of SSIM, of the squared difference of the clamped colors and of the mask.
+// For each tile: sums of the absolute difference, of SSIM, of the squared difference of the clamped colors and of the
+// mask.
 @group(0) @binding(4) var<storage, read_write> tile_sums: array<vec4<f32>>;
 // Loss, absolute difference, squared difference and number of views so far.
 @group(0) @binding(5) var<storage, read_write> totals: array<vec4<f32>>;

@@ -1,6 +1,6 @@
 // noise: moves the means of faint Gaussians at random, in space and time, after a step of training.
-// In: raw parameters of native 4D Gaussians, the seed of the step, the least temporal scale. Out: the same parameters with other means, and
-// no smaller temporal scale. CPU reference: src/offline/fine_tune/noise.rs.
+// In: raw parameters of native 4D Gaussians, the seed of the step, the least temporal scale. Out: the same parameters
+// with other means, and no smaller temporal scale. CPU reference: src/offline/train/reference/noise.rs.
 #import gs4d::training::{NoiseUniforms, TrainedRecord}
 #import gs4d::random::{mixed, word_of}
 #import gs4d::trained::{left_matrix, opacity_of, right_matrix}

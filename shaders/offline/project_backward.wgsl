@@ -1,9 +1,9 @@
-// project_backward: converts gradients of splats to gradients of raw parameters, through projection, slice, color and activations.
-// In: the inputs and outputs of `project` for one part, the sums of `blend_backward`. Out: the gradients of this view, added to the gradients of
-// the batch.
-// CPU reference: src/gaussian/gradient.rs; equations: sections 7.2 to 7.4 of the 4DGS model. COMPAT: as the original computes them, with
-// the deviations of section 7.5. MIP_FILTER: the opacity of each splat is
-// reduced by the filter of Mip-Splatting, in views whose training pixel is 0.
+// project_backward: converts gradients of splats to gradients of raw parameters, through projection, slice, color and
+// activations.
+// In: the inputs and outputs of `project` for one part, the sums of `blend_backward`. Out: the gradients of this view,
+// added to the gradients of the batch. CPU reference: src/gaussian/gradient.rs; equations: sections 7.2 to 7.4 of the
+// 4DGS model. COMPAT: as the original computes them, with the deviations of section 7.5. MIP_FILTER: the opacity of
+// each splat is reduced by the filter of Mip-Splatting, in views whose training pixel is 0.
 #import gs4d::training::{TrainedRecord, TrainedScene}
 #import gs4d::types::{SplatRecord, INVISIBLE}
 #import gs4d::conic::{conic_entries, determinant_of, screen_covariance}
@@ -35,9 +35,9 @@ const FIRST_SEEN: u32 = 3u;
 @group(3) @binding(1) var<storage, read> harmonics: array<vec4<f32>>;
 @group(3) @binding(2) var<storage, read_write> trained_gradients: array<TrainedRecord>;
 @group(3) @binding(3) var<storage, read_write> harmonic_gradients: array<vec4<f32>>;
-// Number of gradients that are not finite so far; for the first of them the index of the Gaussian plus one and the number of the view. Then
-// one word for each Gaussian: the number of views of the batch that show it; then a number for each: the sum of the lengths of the gradients
-// of its center in these views, in normalized device coordinates.
+// Number of gradients that are not finite so far; for the first of them the index of the Gaussian plus one and the
+// number of the view. Then one word for each Gaussian: the number of views of the batch that show it; then a number for
+// each: the sum of the lengths of the gradients of its center in these views, in normalized device coordinates.
 @group(3) @binding(4) var<storage, read_write> notes: array<atomic<u32>>;
 
 // Sums over the pairs of a splat, see `blend_backward`.
@@ -66,16 +66,16 @@ fn sums_of(slot: u32) -> Sums {
     return sums;
 }
 
-// What the color passes on: gradients with respect to the direction and to the time since the frame, and whether those of the coefficients
-// are finite.
+// Gradients through the color with respect to the direction and the temporal mean, and whether those with respect to
+// the coefficients are finite.
 struct ColorSlope {
     direction: vec3<f32>,
     time: f32,
     finite_coefficients: bool,
 }
 
-// Computes the gradients of the coefficients of one Gaussian, and adds them if `is_added`. `g` is the gradient of the color, `tau` the time
-// from the frame to the mean.
+// Computes the gradients of the coefficients of one Gaussian, and adds them if `is_added`. `g` is the gradient of the
+// color, `tau` the time from the frame to the mean.
 fn color_backward(index: u32, g: vec3<f32>, d: vec3<f32>, tau: f32, is_added: bool) -> ColorSlope {
     var slope = ColorSlope(vec3(0.0), 0.0, true);
     let largest = max(max(abs(g.x), abs(g.y)), abs(g.z));

@@ -1,7 +1,9 @@
-// regularize: the terms of the loss that depend on Gaussians alone: motion, difference of motion from neighbors (rigidity), opacity, scale.
-// In: raw parameters of one part, their slice, the neighbors of each Gaussian. Out: the gradients of the terms with respect to the raw parameters, added
-// to the gradients of the batch. CPU reference: src/offline/fine_tune/terms.rs, which defines the terms.
-#import gs4d::training::{TermWeights, TrainedRecord, TrainedScene}
+// regularize: the terms of the loss that depend on Gaussians alone: motion, difference of motion from neighbors
+// (rigidity), opacity, scale.
+// In: raw parameters of one part, their slice, the neighbors of each Gaussian. Out: the gradients of the terms with
+// respect to the raw parameters, added to the gradients of the batch. CPU reference:
+// src/offline/train/reference/terms.rs, which defines the terms.
+#import gs4d::training::{TrainedRecord, TrainedScene}
 #import gs4d::types::GaussianRecord
 #import gs4d::trained::{opacity_of, slice_of, ROTATED_4D}
 #import gs4d::slice_backward::{is_finite_slice, through_slice}
@@ -11,11 +13,26 @@ const NEIGHBORS: u32 = 20u;
 // A shorter vector counts as zero: its square underflows.
 const LEAST_LENGTH: f32 = 1e-15;
 
+// The weights of the terms for each Gaussian. Mirror: src/offline/train/parts/regularizer.rs.
+struct TermWeights {
+    // Weight of the length of its velocity.
+    motion: f32,
+    // Weight of the length of the difference between its velocity and the velocity of a neighbor at the same position.
+    rigid: f32,
+    // Weight of its opacity.
+    opacity: f32,
+    // Weight of each of its spatial scales.
+    scale: f32,
+    // The weight of a neighbor is exp(-falloff distance).
+    falloff: f32,
+}
+
 @group(0) @binding(0) var<uniform> scene: TrainedScene;
 @group(0) @binding(1) var<uniform> weights: TermWeights;
 @group(0) @binding(2) var<storage, read> trained: array<TrainedRecord>;
 @group(0) @binding(3) var<storage, read> gaussians: array<GaussianRecord>;
-// NEIGHBORS indices for each Gaussian. Read only if the rigid term has a weight, which needs that there is one part.
+// NEIGHBORS indices for each Gaussian. Read only if the rigid term has a weight, which is possible only with a single
+// part.
 @group(0) @binding(4) var<storage, read> neighbors: array<u32>;
 @group(0) @binding(5) var<storage, read_write> trained_gradients: array<TrainedRecord>;
 

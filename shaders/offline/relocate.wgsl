@@ -1,15 +1,16 @@
-// relocate: gives Gaussians the colors of others, and begins their moments again.
-// In: moves, each from one Gaussian to another that no move to a third starts from, or to itself; one part of the Gaussians, which may be that of
-// one end of a move alone. Out: `gather` copies the colors that moves start from; after it has done so for all parts, `scatter` writes them where
-// moves lead to. Moments there are 0, those of the sources too unless they keep them. The raw parameters are written by the host. CPU
-// references: src/offline/fine_tune/relocation.rs, src/offline/fine_tune/cloning.rs.
+// relocate: copies the colors of some Gaussians to others, and resets their moments.
+// In: moves, each from a source to a target, which is not the source of a move to another target; one part of the
+// Gaussians, which may contain only one end of a move. Out: `gather` copies the colors of the sources, and sets the
+// moments of the sources to 0 unless they keep them; after it has run for all parts, `scatter` writes the colors to the
+// targets and sets the moments of the targets to 0. The host writes the raw parameters. CPU references:
+// src/offline/train/reference/relocation.rs, src/offline/train/reference/cloning.rs.
 #import gs4d::training::RelocationUniforms
 
 // Four-vectors of the raw parameters of each Gaussian.
 const GEOMETRY: u32 = 5u;
 
 @group(0) @binding(0) var<uniform> settings: RelocationUniforms;
-// x: where to, y: where from; indices among all Gaussians.
+// x: target, y: source; indices among all Gaussians.
 @group(0) @binding(1) var<storage, read> moves: array<vec2<u32>>;
 // The color of each move.
 @group(0) @binding(2) var<storage, read_write> moved: array<vec4<f32>>;

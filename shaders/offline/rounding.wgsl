@@ -1,6 +1,6 @@
 // rounding: replaces trained Gaussians by the values that a package stores of them, for the last steps of training.
-// In: the records that `slice` wrote, the change that rounding makes to each. Out: the same records, rounded. CPU reference:
-// src/scene/packed/rounding.rs.
+// In: the records that `slice` wrote, the change that rounding makes to each. Out: the same records, rounded. CPU
+// reference: src/scene/packed/rounding.rs.
 #import gs4d::training::{RoundingRecord, TrainedScene}
 #import gs4d::types::GaussianRecord
 #import gs4d::trained::diagonal
@@ -18,7 +18,8 @@ fn rounding(@builtin(global_invocation_id) id: vec3<u32>) {
     let g = gaussians[id.x];
     let own = roundings[id.x];
     let mean = g.mean + own.mean;
-    // A factor keeps an inverse_sigma_t of 0 (a Gaussian that is present at every time) at 0, and every other inverse_sigma_t positive.
+    // A factor keeps an inverse_sigma_t of 0 (a Gaussian that is present at every time) at 0, and every other
+    // inverse_sigma_t positive.
     let velocity = vec4(g.velocity.xyz + own.velocity.xyz, g.velocity.w * own.velocity.w);
     let a = g.covariance_a;
     let b = g.covariance_b;

@@ -1,8 +1,8 @@
 // score: the contribution of each Gaussian to a view, without float atomics.
-// In: the inputs and the output of `blend`. Out: for each slot, sums over pixels of c = alpha T (contribution) and c^2 (energy), and the
-// sum over pixels and channels of (c (color - behind))^2 (removal). `place` writes the first pair of each splat;
-// `pairs` sums every pair over its tile, one workgroup per tile; `gather` sums the pairs of each slot in a fixed order, so
-// that the result is the same in every run. CPU reference: src/offline/score/reference.rs.
+// In: the inputs and the output of `blend`. Out: for each slot, sums over pixels of c = alpha T (contribution) and c^2
+// (energy), and the sum over pixels and channels of (c (color - behind))^2 (removal). `place` writes the first pair of
+// each splat; `pairs` sums every pair over its tile, one workgroup per tile; `gather` sums the pairs of each slot in a
+// fixed order, so that the result is the same in every run. CPU reference: src/offline/score/reference.rs.
 #import gs4d::alpha::{alpha_at, is_opaque, is_skipped, left_behind}
 #import gs4d::tile::{pixel_of, tile_count, tile_index}
 #import gs4d::types::INVISIBLE

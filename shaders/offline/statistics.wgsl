@@ -1,7 +1,7 @@
 // statistics: the gradients on the screen by which Gaussians are cloned or split.
-// In: for each Gaussian, the number of views of the batch that show it, and the sum of the lengths of the gradients of its center in them. Out:
-// the mean of these, added to the sum over steps; the number of steps in which it was shown. CPU reference of the gradients:
-// src/reference/blend_backward.rs.
+// In: for each Gaussian, the number of views of the batch that show it, and the sum of the lengths of the gradients of
+// its center in them. Out: the mean of these, added to the sum over steps; the number of steps in which it was shown.
+// CPU reference of the gradients: src/reference/blend_backward.rs.
 
 // The same value as in `project_backward`, which writes the notes.
 const FIRST_SEEN: u32 = 3u;

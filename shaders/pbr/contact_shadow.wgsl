@@ -1,8 +1,8 @@
 // contact_shadow: darkens the ground beneath captures.
 //
-// In: for each shadow its ellipse, as the images in clip space of the center and of the x and z axes of the unit disk, and its look: strength
-// and softness, both from 0 to 1. Out: black blended over the view target where the depth test passes. Each shadow is a strip of four
-// vertices.
+// In: for each shadow its ellipse, as the images in clip space of the center and of the x and z axes of the unit disk,
+// and its look: strength and softness, both from 0 to 1. Out: black blended over the view target where the depth test
+// passes. Each shadow is a strip of four vertices.
 
 struct Vertex {
     @builtin(position) clip: vec4<f32>,

@@ -1,7 +1,8 @@
 // shade: applies the surrounding scene to captures: ambient light, shadows of meshes, fog.
 //
-// In: the captures' color and transmittance (premultiplied, in their blend space) and their depths, for the pixels of the viewport; the
-// lights, shadow maps and fog of Bevy's view (groups 0 and 1). Out: the same picture, shaded; transmittance is unchanged.
+// In: the captures' color and transmittance (premultiplied, in their blend space) and their depths, for the pixels of
+// the viewport; the lights, shadow maps and fog of Bevy's view (groups 0 and 1). Out: the same picture, shaded;
+// transmittance is unchanged.
 #import gs4d::srgb
 #import bevy_pbr::mesh_view_bindings as view_bindings
 #import bevy_pbr::mesh_view_types as view_types
@@ -29,8 +30,8 @@ struct Shading {
     cube_from_world: array<vec4<f32>, 3>,
     // Linear color factor in full shadow; w is 1 if the capture receives shadows.
     tint: vec4<f32>,
-    // x: weight of the scene's light; y: reciprocal of the light during training; z: offset towards lights, world units; w: distance over which
-    // the capture's own shadow sets in, world units, 0 if it casts none.
+    // x: weight of the scene's light; y: reciprocal of the light during training; z: offset towards lights, world
+    // units; w: distance over which the capture's own shadow sets in, world units, 0 if it casts none.
     light: vec4<f32>,
 }
 
@@ -48,7 +49,8 @@ struct Settings {
 }
 
 @group(2) @binding(0) var colors: texture_2d<f32>;
-// Camera units: x the sum of z alpha T, not divided by 1 - T; y the depth at which T falls to one half or below, 0 if it never does.
+// Camera units: x the sum of z alpha T, not divided by 1 - T; y the depth at which T falls to one half or below, 0 if
+// it never does.
 @group(2) @binding(1) var depths: texture_2d<f32>;
 @group(2) @binding(2) var<uniform> settings: Settings;
 
@@ -109,8 +111,8 @@ fn point_at(position: vec2<f32>, alpha: f32) -> Point {
     return point;
 }
 
-// Returns the shading of the capture at a point. The picture does not contain the index of the capture: the capture in whose box the point
-// lies deepest is used. The environment map belongs to the capture with the largest box.
+// Returns the shading of the capture at a point. The picture does not contain the index of the capture: the capture in
+// whose box the point lies deepest is used. The environment map belongs to the capture with the largest box.
 fn shading_of(point: Point) -> u32 {
     var best = 0u;
     var least = 0.0;
@@ -167,10 +169,12 @@ fn darkened(tint: vec3<f32>, visibility: f32) -> vec3<f32> {
     return mix(tint, vec3(1.0), visibility);
 }
 
-// Returns the color factor of all lights that cast shadows. A capture has no normals: every light counts as perpendicular to the surface.
+// Returns the color factor of all lights that cast shadows. A capture has no normals: every light counts as
+// perpendicular to the surface.
 //
-// The point is moved towards a light before its shadow is looked up: by `bias` and, if the capture casts a shadow itself, by the width of the pixel.
-// Over the distance `own` behind the surface the capture's own shadow sets in gradually, so that errors of depth are no sharp blotches.
+// The point is moved towards a light before its shadow is looked up: by `bias` and, if the capture casts a shadow
+// itself, by the width of the pixel. Over the distance `own` behind the surface the capture's own shadow sets in
+// gradually, so that errors of depth do not appear as sharp blotches.
 fn shadow(point: Point, tint: vec3<f32>, bias: f32, own: f32) -> vec3<f32> {
     let steps = select(1u, OWN_STEPS, own > 0.0);
     let first = bias + min(point.width, own);
@@ -202,7 +206,8 @@ fn shadow(point: Point, tint: vec3<f32>, bias: f32, own: f32) -> vec3<f32> {
         let ray = (*light).position_radius.xyz - point.world;
         let squared = dot(ray, ray);
         let toward = ray * inverseSqrt(max(squared, 1e-12));
-        // The window with which Bevy ends lights at their range, without the falloff inside the range: shadows are a contrast.
+        // The window with which Bevy ends lights at their range, without the falloff inside the range: shadows are a
+        // contrast.
         let share = squared * (*light).color_inverse_square_range.w;
         let window = saturate(1.0 - share * share);
         var weight = window * window;
@@ -236,7 +241,8 @@ fn spot_cone(id: u32, toward: vec3<f32>) -> f32 {
 }
 
 #ifdef DISTANCE_FOG
-// Returns a linear color behind Bevy's fog, as on its meshes. Of the light of the fog itself it has the fraction `share`.
+// Returns a linear color behind Bevy's fog, as on its meshes. `share` is the fraction of the light of the fog itself
+// that is added.
 fn fogged(color: vec3<f32>, point: Point, share: f32) -> vec3<f32> {
     let haze = view_bindings::fog;
     let ray = point.world - view_bindings::view.world_position;
@@ -259,7 +265,7 @@ fn fogged(color: vec3<f32>, point: Point, share: f32) -> vec3<f32> {
     return in_fog(color, distance, scattering) - (1.0 - share) * in_fog(vec3(0.0), distance, scattering);
 }
 
-// Returns a linear color behind Bevy's fog of this thickness.
+// Returns a linear color behind Bevy's fog at this distance.
 fn in_fog(color: vec3<f32>, distance: f32, scattering: vec3<f32>) -> vec3<f32> {
     let haze = view_bindings::fog;
     let plain = vec4(color, 1.0);
@@ -275,8 +281,9 @@ fn in_fog(color: vec3<f32>, distance: f32, scattering: vec3<f32>) -> vec3<f32> {
     return color;
 }
 
-// Returns the fraction of the light of the fog in front of a pixel of this linear color. A surface has all of it. Particles darker than the fog
-// have less: faint black Gaussians, which training on a black background leaves in number, are invisible over black, and stay so.
+// Returns the fraction of the light of the fog in front of a pixel of this linear color. A surface has all of it.
+// Particles darker than the fog have less: training on a black background leaves many faint black Gaussians, which are
+// invisible over black and must stay invisible in fog.
 fn fog_share(color: vec3<f32>, alpha: f32) -> f32 {
     let encoded = srgb::encode(max(color, vec3(0.0)));
     let brightness = max(encoded.x, max(encoded.y, encoded.z));

@@ -18,10 +18,11 @@ const TRANSMITTANCE_MIN: f32 = 1e-4;
 //     let left = left_behind(transmittance, alpha);      if is_opaque(left), the pixel is finished without the splat,
 //     color += alpha * transmittance * splat's color;    transmittance = left.
 //
-// These are separate functions because a single function that returns which of the three cases applies makes `blend`
-// a seventh slower.
+// These are separate functions because a single function that returns which of the three cases applies makes `blend` a
+// seventh slower.
 
-// Returns the alpha of a splat at a pixel; `conic` is factored, `offset` is the vector from the pixel to the splat's center, pixels.
+// Returns the alpha of a splat at a pixel; `conic` is factored, `offset` is the vector from the pixel to the splat's
+// center, pixels.
 fn alpha_at(conic: vec3<f32>, opacity: f32, offset: vec2<f32>) -> f32 {
     return min(ALPHA_MAX, opacity * exp(exponent_at(conic, offset)));
 }

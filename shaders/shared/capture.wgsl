@@ -1,5 +1,5 @@
-// The Gaussians of one part of a capture and the instance in which they are drawn, for the passes that read them. In: an index. Out: a
-// Gaussian, read in single precision or unpacked (PACKED_GEOMETRY).
+// The Gaussians of one part of a capture and the instance in which they are drawn, for the passes that read them. In:
+// an index. Out: a Gaussian, read in single precision or unpacked (PACKED_GEOMETRY).
 #define_import_path gs4d::capture
 
 #import gs4d::types::{GaussianRecord, InstanceUniforms}
@@ -9,8 +9,9 @@
 #endif
 
 #ifdef COPIED_INSTANCE
-// One dispatch for several instances of a capture, one for each z of its workgroups: the entry point copies the uniforms of its instance.
-// Also for drivers that recompile a pass for each dispatch if a branch depends only on uniforms at constant offsets.
+// One dispatch for several instances of a capture, one for each z of its workgroups: the entry point copies the
+// uniforms of its instance. Also for drivers that recompile a pass for each dispatch if a branch depends only on
+// uniforms at constant offsets.
 struct InstanceSlot {
     uniforms: InstanceUniforms,
     // Padding to 512 bytes, the distance of dynamic offsets.
@@ -27,7 +28,8 @@ var<private> instance: InstanceUniforms;
 @group(1) @binding(1) var<storage, read> ranges: array<vec4<f32>>;
 #else
 @group(1) @binding(0) var<storage, read> gaussians: array<GaussianRecord>;
-// A copy of mean_t and inverse_sigma_t of each Gaussian: most Gaussians of a long capture are absent, and of those only the copy is read.
+// A copy of mean_t and inverse_sigma_t of each Gaussian: most Gaussians of a long capture are absent, and of those only
+// the copy is read.
 @group(1) @binding(1) var<storage, read> lifespans: array<vec2<f32>>;
 #endif
 // The list that `activate` writes; read only with a filter.

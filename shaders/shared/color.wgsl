@@ -1,8 +1,8 @@
-// The color of a Gaussian from its spherical and temporal harmonics, stored whole or by codebook (CODED_COLORS). In: the Gaussian, its
-// index and the time since its temporal mean. Out: its color in the blend space.
+// The color of a Gaussian from its spherical and temporal harmonics, stored whole or by codebook (CODED_COLORS). In:
+// the Gaussian, its index and the time since its temporal mean. Out: its color in the blend space.
 //
-// A color is a sum of SHARES partial sums. Each partial sum, called share here and in src/renderer/capture/buffers.rs, has four of the
-// sixteen coefficients of each time harmonic.
+// A color is a sum of SHARES partial sums. Each partial sum, called share here and in src/renderer/capture/buffers.rs,
+// has four of the sixteen coefficients of each time harmonic.
 #define_import_path gs4d::color
 
 #import gs4d::records::Gaussian
@@ -17,7 +17,8 @@
 #ifdef CODED_COLORS
 // Three words for each Gaussian.
 @group(3) @binding(0) var<storage, read> color_records: array<u32>;
-// Entries of a multiple of six four-vectors: 48 half-precision values for each time harmonic, in the order of `coded_share`.
+// Entries of a multiple of six four-vectors: 48 half-precision values for each time harmonic, in the order of
+// `coded_share`.
 @group(3) @binding(1) var<storage, read> codebooks: array<vec4<u32>>;
 #else
 @group(3) @binding(0) var<storage, read> harmonics: array<vec4<f32>>;
@@ -61,7 +62,8 @@ fn time_factors(tau: f32) -> vec3<f32> {
 }
 
 #ifdef CODED_COLORS
-// Returns a share of a color, summed over all codebooks. The first share includes the first coefficient, which is not in the codebooks.
+// Returns a share of a color, summed over all codebooks. The first share includes the DC coefficient, which is not in
+// the codebooks.
 fn color_share(share: u32, index: u32, direction: vec3<f32>, tau: f32) -> vec3<f32> {
     var sum = vec3(0.0);
     if share == 0u {
@@ -110,8 +112,8 @@ fn color_share(share: u32, index: u32, direction: vec3<f32>, tau: f32) -> vec3<f
 #endif
 
 #ifdef CODED_COLORS
-// The share of a codebook entry: words of two values. If an entry has fewer time harmonics, other words of the entry fill the missing ones;
-// their factors are 0.
+// The share of a codebook entry: words of two values. If an entry has fewer time harmonics, other words of the entry
+// fill the missing ones; their factors are 0.
 struct EntryShare {
     a: vec4<u32>,
     b: vec4<u32>,
@@ -120,8 +122,8 @@ struct EntryShare {
     e: vec4<u32>,
 }
 
-// Returns the share of an entry. The words of the four shares are interleaved in groups of four, then of two, so that the threads of one
-// splat read neighboring words.
+// Returns the share of an entry. The words of the four shares are interleaved in groups of four, then of two, so that
+// the threads of one splat read neighboring words.
 fn load_entry(entry: u32, share: u32) -> EntryShare {
     let own = entry + share;
     let pair = entry + share / 2u;

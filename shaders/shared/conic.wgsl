@@ -1,6 +1,6 @@
-// The covariance of a splat on the screen and its inverse, the conic. In: a covariance in capture space and the rows of the projection.
-// Out: the covariance on the screen with the low-pass, its determinant, and the conic in factored form, all of them finite and positive
-// definite. CPU reference: src/gaussian/conic.rs, which says why the conic is factored:
+// The covariance of a splat on the screen and its inverse, the conic. In: a covariance in capture space and the rows of
+// the projection. Out: the covariance on the screen with the low-pass, its determinant, and the conic in factored form,
+// all of them finite and positive definite. CPU reference: src/gaussian/conic.rs, which says why the conic is factored:
 //
 //     d^T S^-1 d = x (dx + y dy)^2 + z dy^2        x = Syy / det,  y = -Sxy / Syy,  z = 1 / Syy
 #define_import_path gs4d::conic
@@ -12,7 +12,8 @@ const MAX_VARIANCE: f32 = 1e18;
 // Below this ratio of the determinant to the product of the variances, the determinant is computed from cofactors.
 const THIN: f32 = 0.00390625;
 
-// Returns the covariance on the screen: xx, xy, yy, pixels squared. Negative variances, which rounding can produce, count as 0.
+// Returns the covariance on the screen: xx, xy, yy, pixels squared. Negative variances, which rounding can produce,
+// count as 0.
 fn screen_covariance(covariance: mat3x3<f32>, row_x: vec3<f32>, row_y: vec3<f32>) -> vec3<f32> {
     let cx = covariance * row_x;
     return vec3(
@@ -37,8 +38,8 @@ fn determinant_of(screen: vec3<f32>, covariance: mat3x3<f32>, row_x: vec3<f32>, 
     return det;
 }
 
-// Returns the determinant without the low-pass, between 0 and `most`: n^T adj(S) n with the cross product n of the rows and the cofactors
-// adj(S) of the covariance in capture space.
+// Returns the determinant without the low-pass, between 0 and `most`: n^T adj(S) n with the cross product n of the rows
+// and the cofactors adj(S) of the covariance in capture space.
 fn flat_determinant(covariance: mat3x3<f32>, row_x: vec3<f32>, row_y: vec3<f32>, most: f32) -> f32 {
     let diagonal = vec3(covariance[0].x, covariance[1].y, covariance[2].z);
     // yz, xz, xy

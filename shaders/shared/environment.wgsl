@@ -15,8 +15,8 @@ fn environment_texel(origin: vec3<f32>, direction: vec3<f32>, size: vec2<u32>) -
     return vec2(u, v) * vec2<f32>(size) - 0.5;
 }
 
-// Returns the texel coordinates behind the center of a pixel of a picture. `projection` is P00, P11, P02, P12; the axes are the columns of
-// camera-to-world, w: the camera position.
+// Returns the texel coordinates behind the center of a pixel of a picture. `projection` is P00, P11, P02, P12; the axes
+// are the columns of camera-to-world, w: the camera position.
 fn environment_behind(
     pixel: vec2<f32>,
     picture: vec2<u32>,

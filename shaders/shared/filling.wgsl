@@ -1,5 +1,5 @@
-// Filling of bins with splats, by workgroups of 256 threads. A workgroup counts its splats of each bin in workgroup memory, and reserves
-// entries for all of them at once.
+// Filling of bins with splats, by workgroups of 256 threads. A workgroup counts its splats of each bin in workgroup
+// memory, and reserves entries for all of them at once.
 // In: a splat for each thread. Out: entries of bins, in no order.
 //
 //     begin_filling(filling, thread);
@@ -15,12 +15,14 @@
 
 #import gs4d::bins::entry_word
 
-// Counters (see BIN_COUNTERS), the number of visible splats of each part, the number of splats of each bin, the place of each bin.
+// Counters (see BIN_COUNTERS), the number of visible splats of each part, the number of splats of each bin, the place
+// of each bin.
 @group(0) @binding(2) var<storage, read_write> bins: array<atomic<u32>>;
 // Bin by bin: the depth key of a splat, and a word with its slot and the tiles of the bin that it covers.
 @group(0) @binding(3) var<storage, read_write> bin_entries: array<vec2<u32>>;
 
-// Bins whose splats a workgroup counts in workgroup memory. Fewer counters allow more workgroups to run at the same time.
+// Bins whose splats a workgroup counts in workgroup memory. Fewer counters allow more workgroups to run at the same
+// time.
 #ifdef FEW_BINS
 const OWN_BINS: u32 = 512u;
 #else
@@ -32,7 +34,8 @@ const WIDE: u32 = 64u;
 
 // Splats of the workgroup in each bin, then the index of the next entry.
 var<workgroup> own: array<atomic<u32>, OWN_BINS>;
-// Splats in more than OWN_ENTRIES bins, at most WIDE, which all threads put into bins together: tiles, depth key and slot.
+// Splats in more than OWN_ENTRIES bins, at most WIDE, which all threads put into bins together: tiles, depth key and
+// slot.
 var<workgroup> wide: array<vec4<u32>, WIDE>;
 var<workgroup> wide_listed: atomic<u32>;
 
@@ -94,7 +97,8 @@ fn wide_tiles(i: u32) -> vec4<u32> {
     return vec4(wide[i].xy & vec2(0xffffu), wide[i].xy >> vec2(16u));
 }
 
-// Reserves entries for the splats that the workgroup has counted. Returns how many of them all threads put into bins together.
+// Reserves entries for the splats that the workgroup has counted. Returns how many of them all threads put into bins
+// together.
 fn reserve_entries(filling: Filling, thread: u32) -> u32 {
     let wide_count = min(workgroupUniformLoad(&wide_listed), WIDE);
     let by_group = filling.count <= OWN_BINS;
@@ -116,7 +120,8 @@ fn reserve_entries(filling: Filling, thread: u32) -> u32 {
     return wide_count;
 }
 
-// Writes a splat into one of its bins. If the bins are too many for the counters of the workgroup, an entry is reserved first.
+// Writes a splat into one of its bins. If the bins are too many for the counters of the workgroup, an entry is reserved
+// first.
 fn put_in_bin(filling: Filling, x: u32, y: u32, tiles: vec4<u32>, key: u32, slot: u32) {
     let bin = y * filling.across + x;
     var place = 0u;

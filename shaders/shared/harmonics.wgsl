@@ -1,7 +1,8 @@
 // Spherical harmonics up to degree 3. CPU reference: src/gaussian/harmonics.rs.
 #define_import_path gs4d::harmonics
 
-// The next four functions return basis values 0-3, 4-7, 8-11, 12-15 in the unit direction `d`, with the constants and signs of 3DGS.
+// The next four functions return basis values 0-3, 4-7, 8-11, 12-15 in the unit direction `d`, with the constants and
+// signs of 3DGS.
 fn basis_first(d: vec3<f32>) -> vec4<f32> {
     return vec4(0.28209479, -0.48860251 * d.y, 0.48860251 * d.z, -0.48860251 * d.x);
 }
@@ -33,7 +34,8 @@ fn basis_fourth(d: vec3<f32>) -> vec4<f32> {
     );
 }
 
-// The next four functions return derivatives of four basis values with respect to x, y and z of the direction, in the columns.
+// The next four functions return derivatives of four basis values with respect to x, y and z of the direction, in the
+// columns.
 fn slope_first() -> mat3x4<f32> {
     let c = 0.48860251;
     return mat3x4(vec4(0.0, 0.0, 0.0, -c), vec4(0.0, -c, 0.0, 0.0), vec4(0.0, 0.0, c, 0.0));

@@ -1,6 +1,7 @@
-// Selection of the nearest splats that fit into a list, by counting splats in intervals of the order of blending (depth key, slot).
-// In: for each step, the candidates. Out: the last position up to which the candidates after `lower` fit. At least one candidate fits, as
-// slots are unique.
+// Selection of the nearest splats that fit into a list, by counting splats in intervals of the order of blending (depth
+// key, slot).
+// In: for each step, the candidates. Out: the last position up to which the candidates after `lower` fit. At least one
+// candidate fits, as slots are unique.
 //
 //     var search = begin_search(lower, least, greatest);
 //     while !search.found {
@@ -19,7 +20,8 @@ const INTERVALS: u32 = 256u;
 const GROUPED: u32 = 16u;
 
 struct Search {
-    // The position before all candidates, and the range that is divided: of depth keys, or of slots if more splats than fit have key `key`.
+    // The position before all candidates, and the range that is divided: of depth keys, or of slots if more splats than
+    // fit have key `key`.
     lower: vec2<u32>,
     low: u32,
     high: u32,

@@ -93,7 +93,7 @@ fn with_largest(three: vec3<f32>, largest: u32) -> vec4<f32> {
     return vec4(three, rest);
 }
 
-// Decodes the first coefficient of a coded color: ten bits for each channel.
+// Decodes the DC coefficient of a coded color: ten bits for each channel.
 fn unpack_base(word: u32, base: vec4<f32>) -> vec3<f32> {
     let parts = vec3(f32(word & 1023u), f32((word >> 10u) & 1023u), f32((word >> 20u) & 1023u));
     return base.x + parts / 1023.0 * base.y;

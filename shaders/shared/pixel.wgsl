@@ -1,5 +1,5 @@
-// Blending of one pixel front to back: opaque surfaces, splats, background. Used by `blend` and `blend_blocks`, which differ in how they find
-// the splats. CPU reference: src/reference/blend.rs.
+// Blending of one pixel front to back: opaque surfaces, splats, background. Used by `blend` and `blend_blocks`, which
+// differ in how they find the splats. CPU reference: src/reference/blend.rs.
 #define_import_path gs4d::pixel
 
 #import gs4d::types::{FrameUniforms, BACKGROUND_COLOR, BACKGROUND_ENVIRONMENT, DEBUG_DEPTH, DEBUG_OVERDRAW}
@@ -10,7 +10,8 @@
 const FAR: f32 = 3.4e38;
 // Number of blended splats at the upper end of the overdraw scale.
 const OVERDRAW_MAX: f32 = 64.0;
-// Loops over samples have this constant bound, so that they are unrolled: software drivers end all loops of a thread after 65,535 iterations.
+// Loops over samples have this constant bound, so that they are unrolled: software drivers end all loops of a thread
+// after 65,535 iterations.
 #ifdef MULTISAMPLED
 const SAMPLES_MAX: u32 = 8u;
 #else
@@ -48,7 +49,8 @@ struct Pixel {
     median: f32,
     // Number of splats blended.
     blended: u32,
-    // Number of samples whose surface is in front of the current splat, their summed transmittance, and the depth of the next surface.
+    // Number of samples whose surface is in front of the current splat, their summed transmittance, and the depth of
+    // the next surface.
     hidden: u32,
     hidden_transmittance: f32,
     limit: f32,
@@ -63,8 +65,8 @@ fn begin_pixel(at: vec2<u32>) -> Pixel {
     return Pixel(vec3(0.0), 1.0, 0.0, 0.0, 0u, 0u, 0.0, next_limit(-FAR), !inside);
 }
 
-// Passes the surfaces in front of a splat at this depth, the nearest splat that has not been blended: in their samples these surfaces hide
-// this splat and all later splats.
+// Passes the surfaces in front of a splat at this depth, the nearest splat that has not been blended: in their samples
+// these surfaces hide this splat and all later splats.
 fn pass_surfaces(pixel: ptr<function, Pixel>, depth: f32) {
     let passed = passed_limits(depth);
     (*pixel).hidden_transmittance += f32(passed - (*pixel).hidden) * (*pixel).transmittance;
@@ -127,7 +129,8 @@ fn finish_pixel(pixel: Pixel, at: vec2<u32>) {
     textureStore(depth_out, at, vec4(pixel.depth, pixel.median, 0.0, 0.0));
 }
 
-// Writes the color of a pixel over the background, without depths. `behind` is the transmittance of the samples without a surface.
+// Writes the color of a pixel over the background, without depths. `behind` is the transmittance of the samples without
+// a surface.
 fn write_color(color: vec3<f32>, transmittance: f32, behind: f32, at: vec2<u32>) {
     textureStore(color_out, at, over_background(color, transmittance, behind, at));
 }
@@ -155,7 +158,8 @@ fn surface_range(pixel: vec2<u32>, inside: bool) -> vec2<f32> {
     return range;
 }
 
-// Returns the number of samples of a pixel whose surface is nearer than `depth`; with FAR, the number of samples that have a surface.
+// Returns the number of samples of a pixel whose surface is nearer than `depth`; with FAR, the number of samples that
+// have a surface.
 fn samples_before(pixel: vec2<u32>, depth: f32) -> u32 {
     var before = 0u;
     for (var i = 0u; i < sample_count(); i++) {

@@ -1,5 +1,5 @@
-// Slicing and projection of one Gaussian, for `project` and `project_bin`. In: an index. Out: its footprint on the screen, as the original
-// rasterizer computes it. CPU reference: src/gaussian/projection.rs.
+// Slicing and projection of one Gaussian, for `project` and `project_bin`. In: an index. Out: its footprint on the
+// screen, as the original rasterizer computes it. CPU reference: src/gaussian/projection.rs.
 #define_import_path gs4d::projection
 
 #import gs4d::types::{DEBUG_ACTIVE, DEBUG_LIFESPAN, DEBUG_VELOCITY, INVISIBLE}
@@ -112,14 +112,14 @@ fn projection_of(index: u32) -> Projection {
     p.depth = q.z;
     p.conic = conic_of(screen, det);
     p.tiles = vec4<u32>(tiles);
-    // Positive floats have the same order as their bits. For an orthographic camera, depths are measured from the near plane, which may be
-    // behind the camera.
+    // Positive floats have the same order as their bits. For an orthographic camera, depths are measured from the near
+    // plane, which may be behind the camera.
     p.depth_key = bitcast<u32>(select(q.z, q.z - instance.near, parallel));
     return p;
 }
 
-// Returns the factor on the opacity of a splat that compensates for a low-pass that is wider than it was in training. `per_unit` is in
-// pixels per camera unit.
+// Returns the factor on the opacity of a splat that compensates for a low-pass that is wider than it was in training.
+// `per_unit` is in pixels per camera unit.
 fn compensation(per_unit: vec2<f32>, screen: vec3<f32>, det: f32) -> f32 {
     let trained = instance.trained_variance * LOW_PASS * per_unit * per_unit;
     let wider = max(LOW_PASS - trained, vec2(0.0));

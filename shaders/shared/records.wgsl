@@ -1,5 +1,5 @@
-// Gaussians and splats, and their records in storage. Drivers load and store each member of a structure separately: records have members of
-// four words, the widest access.
+// Gaussians and splats, and their records in storage. Drivers load and store each member of a structure separately:
+// records have members of four words, the widest access.
 #define_import_path gs4d::records
 
 #import gs4d::types::{GaussianRecord, SplatRecord, SplatShape}

@@ -10,8 +10,8 @@ fn saturating_add(a: u32, b: u32) -> u32 {
     return select(a + b, 0xffffffffu, a + b < a);
 }
 
-// Returns the sum of the values of all threads before this one. Every thread of the workgroup must call this function. It starts with a
-// barrier, so that it can be called repeatedly.
+// Returns the sum of the values of all threads before this one. Every thread of the workgroup must call this function.
+// It starts with a barrier, so that it can be called repeatedly.
 fn exclusive_scan(value: u32, thread: u32) -> u32 {
     let slot = thread + thread / 16u;
     workgroupBarrier();

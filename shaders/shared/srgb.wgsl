@@ -1,4 +1,5 @@
-// The sRGB transfer functions for nonnegative values; the power curve continues above 1. CPU reference: src/view/srgb.rs.
+// The sRGB transfer functions for nonnegative values; the power curve continues above 1. CPU reference:
+// src/view/srgb.rs.
 #define_import_path gs4d::srgb
 
 // Converts linear light to sRGB-encoded values.

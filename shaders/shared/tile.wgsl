@@ -8,8 +8,8 @@
 // Side of a tile in pixels.
 const TILE_SIZE: u32 = 16u;
 
-// Returns the tiles that the original assigns: the tiles of the square of +-`radius` pixels around `center`, clamped to the
-// grid.
+// Returns the tiles that the original assigns: the tiles of the square of +-`radius` pixels around `center`, clamped to
+// the grid.
 fn tiles_of(center: vec2<f32>, radius: f32, grid: vec2<f32>) -> vec4<f32> {
     let side = f32(TILE_SIZE);
     let low = clamp(trunc((center - radius) / side), vec2(0.0), grid);
@@ -17,8 +17,8 @@ fn tiles_of(center: vec2<f32>, radius: f32, grid: vec2<f32>) -> vec4<f32> {
     return vec4(low, high);
 }
 
-// Returns the part of `tiles` where alpha can reach 1/255, possibly empty; `blend` would skip the splat in the other tiles.
-// `variance` is xx and yy of the covariance on the screen.
+// Returns the part of `tiles` where alpha can reach 1/255, possibly empty; `blend` would skip the splat in the other
+// tiles. `variance` is xx and yy of the covariance on the screen.
 fn contributing_tiles(
     tiles: vec4<f32>,
     center: vec2<f32>,

@@ -60,8 +60,8 @@ struct InstanceUniforms {
     cropped: u32,
     // Gaussians per thread of `project_bin`.
     per_thread: u32,
-    // Tile bins. x: tiles along each side of a bin (8 bits) and frame number; y: capacity of each bin in splats, or 0 if bins are
-    // counted before they are filled; z: index of this part; w: number of parts.
+    // Tile bins. x: tiles along each side of a bin (8 bits) and frame number; y: capacity of each bin in splats, or 0
+    // if bins are counted before they are filled; z: index of this part; w: number of parts.
     binning: vec4<u32>,
     // Screen-space variances of one training pixel squared, at one pixel per camera unit.
     trained_variance: vec2<f32>,
@@ -203,7 +203,7 @@ const SORT_SLOTS: u32 = 0u;
 const SORT_VISIBLE: u32 = 1u;
 const SORT_PAIRS: u32 = 2u;
 
-// Number of counters of tile bins before the counters of parts and bins: pairs of this frame, modulo 2^32, how often this number
-// has wrapped, and the depth order of the farthest surface; then visible splats, pairs, splats of the fullest bin and pairs for which room was
-// asked of the previous frame.
+// Number of counters of tile bins before the counters of parts and bins: pairs of this frame, modulo 2^32, how often
+// this number has wrapped, and the depth order of the farthest surface; then visible splats, pairs, splats of the
+// fullest bin and pairs for which room was requested, of the previous frame.
 const BIN_COUNTERS: u32 = 7u;

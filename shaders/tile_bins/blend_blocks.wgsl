@@ -2,9 +2,9 @@
 // In: the list of the tile that `sort_bins` wrote, splats, the depth of opaque surfaces, the background. Out: color and
 // transmittance, with DEPTHS also expected and median depth. CPU reference: src/reference/blend.rs.
 //
-// The list is read in batches: each thread loads one splat and finds the blocks of 8 x 4 pixels that it can contribute to; each block
-// queues its own splats, and its 32 threads blend them. If the list was not written for lack of space, all splats are searched for the
-// nearest splats of each batch instead. The picture is the same.
+// The list is read in batches: each thread loads one splat and finds the blocks of 8 x 4 pixels that it can contribute
+// to; each block queues its own splats, and its 32 threads blend them. If the list was not written for lack of space,
+// all splats are searched for the nearest splats of each batch instead. The picture is the same.
 #import gs4d::types::{SplatShape, VisibleSplat}
 #import gs4d::records::{read_shape, Splat}
 #import gs4d::bins::{depth_order, is_after, stamp, FIRST, NONE, STAMP_MASK}
@@ -20,8 +20,8 @@
 #import gs4d::tile::{energy_of, TILE_SIZE}
 
 const THREADS: u32 = 256u;
-// Splats per batch. Larger batches wait less often for the slowest block; smaller batches need less workgroup memory, so that more
-// workgroups run at the same time.
+// Splats per batch. Larger batches wait less often for the slowest block; smaller batches need less workgroup memory,
+// so that more workgroups run at the same time.
 #ifdef LARGE_BATCHES
 const BATCH: u32 = 256u;
 #else
@@ -51,15 +51,16 @@ const LOG2_ALPHA_MAX: f32 = -0.014499569;
 @group(1) @binding(3) var<storage, read> splat_colors: array<vec4<f32>>;
 @group(1) @binding(4) var<storage, read> visible: array<VisibleSplat>;
 
-// batch_a: center, conic x scaled for exp2 and y. batch_b: conic z scaled, log2 of opacity, red, green. batch_c: blue and depth, padded to the
-// same stride, so that one address serves all three arrays. The last element is a splat that is skipped at every pixel.
+// batch_a: center, conic x scaled for exp2 and y. batch_b: conic z scaled, log2 of opacity, red, green. batch_c: blue
+// and depth, padded to the same stride, so that one address serves all three arrays. The last element is a splat that
+// is skipped at every pixel.
 var<workgroup> batch_a: array<vec4<f32>, BATCH + 1u>;
 var<workgroup> batch_b: array<vec4<f32>, BATCH + 1u>;
 var<workgroup> batch_c: array<vec4<f32>, BATCH + 1u>;
 // Blocks that each splat of the batch can contribute to, one bit per block.
 var<workgroup> reached: array<u32, BATCH>;
-// Splats of the batch that each block blends, in order, and AT_ONCE elements of padding for reads ahead. During a search: the depth keys of
-// the splats found and, from BATCH on, their slots.
+// Splats of the batch that each block blends, in order, and AT_ONCE elements of padding for reads ahead. During a
+// search: the depth keys of the splats found and, from BATCH on, their slots.
 var<workgroup> queues: array<u32, BLOCKS * BATCH + AT_ONCE>;
 #ifndef SUBGROUPS_OF_32
 // Number of splats that each thread queues.
@@ -88,7 +89,8 @@ fn splat_of_tile(i: u32) -> vec2<u32> {
     return vec2(depth_order(splats[slot].place.w), slot);
 }
 
-// Lists the splats of this tile after `lower` and not after `upper`, unordered. Returns their number; at most BATCH are listed.
+// Lists the splats of this tile after `lower` and not after `upper`, unordered. Returns their number; at most BATCH are
+// listed.
 fn search(lower: vec2<u32>, upper: vec2<u32>, thread: u32) -> u32 {
     workgroupBarrier();
     if thread == 0u {
@@ -128,8 +130,8 @@ fn last_fitting(lower: vec2<u32>, thread: u32) -> vec2<u32> {
     return nearest.last;
 }
 
-// Lists the nearest splats of this tile after `lower` that fit into a batch, in depth order. Returns the position of the last; NONE if no
-// splat remains.
+// Lists the nearest splats of this tile after `lower` that fit into a batch, in depth order. Returns the position of
+// the last; NONE if no splat remains.
 fn search_batch(lower: vec2<u32>, thread: u32) -> vec2<u32> {
     var upper = NONE;
     if search(lower, NONE, thread) > BATCH {
@@ -205,7 +207,8 @@ fn place_of(i: u32) -> u32 {
 }
 #endif
 
-// Returns the blocks of 8 x 4 pixels where the alpha of a splat can reach 1/255, one bit per block, with a margin for rounding.
+// Returns the blocks of 8 x 4 pixels where the alpha of a splat can reach 1/255, one bit per block, with a margin for
+// rounding.
 fn blocks_reached(splat: Splat) -> u32 {
     let c = splat.conic;
     let bound = energy_of(splat.opacity) * 1.001 + 0.02;
@@ -233,8 +236,8 @@ fn blocks_reached(splat: Splat) -> u32 {
     return blocks;
 }
 
-// Lists the splats of the batch that can contribute to each block, in order. Returns their number, rounded up to a multiple of AT_ONCE: the
-// queue is padded with BATCH, a splat that is skipped at every pixel.
+// Lists the splats of the batch that can contribute to each block, in order. Returns their number, rounded up to a
+// multiple of AT_ONCE: the queue is padded with BATCH, a splat that is skipped at every pixel.
 fn queue_splats(thread: u32) -> u32 {
     let block = thread / LANES;
     let lane = thread % LANES;
@@ -293,7 +296,8 @@ fn queued_four(at: u32) -> vec4<u32> {
     return vec4(queues[at], queues[at + 1u], queues[at + 2u], queues[at + 3u]);
 }
 
-// Returns the alphas of four splats of the batch. Computed before blending, the four exponentials are independent of each other.
+// Returns the alphas of four splats of the batch. Computed before blending, the four exponentials are independent of
+// each other.
 fn batch_alphas(four: vec4<u32>, position: vec2<f32>) -> vec4<f32> {
     return vec4(
         batch_alpha(batch_a[four.x], batch_b[four.x], position),
@@ -335,7 +339,8 @@ fn blend_four(pixel: ptr<function, Pixel>, alphas: vec4<f32>, four: vec4<u32>) {
     blend_or_skip(pixel, alphas.w, batch_color(four.w), depths.w);
 }
 #else
-// Color blended so far and remaining transmittance: `left` is 0 once the pixel is opaque, and `opaque_at` is its transmittance before that.
+// Color blended so far and remaining transmittance: `left` is 0 once the pixel is opaque, and `opaque_at` is its
+// transmittance before that.
 struct Sample {
     color: vec3<f32>,
     left: f32,
@@ -364,7 +369,8 @@ fn blend_one(sample: ptr<function, Sample>, alpha: f32, color: vec3<f32>) {
     (*sample).left = left;
 }
 
-// Blends four splats with these alphas and colors, which are loaded before the test for opacity. Returns whether the pixel is opaque.
+// Blends four splats with these alphas and colors, which are loaded before the test for opacity. Returns whether the
+// pixel is opaque.
 fn blend_four(sample: ptr<function, Sample>, alphas: vec4<f32>, colors: mat4x3<f32>) -> bool {
     // Fused multiply-adds: each splat depends on one instruction of the previous splat.
     let left = (*sample).left;
@@ -487,15 +493,16 @@ fn blend_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
             first += BATCH;
             more = first < end;
 #ifdef LARGE_BATCHES
-            // Loaded while this batch is blended. With small batches, other workgroups run while this one waits for memory.
+            // Loaded while this batch is blended. With small batches, other workgroups run while this one waits for
+            // memory.
             next = load_pair(first + own, end);
 #endif
         }
         let queue = block * BATCH;
         if !done {
 #ifdef EIGHT_AT_ONCE
-            // The next splats of the queue are loaded before the current ones are blended: in a small picture too few threads run to hide the
-            // memory latency.
+            // The next splats of the queue are loaded before the current ones are blended: in a small picture too few
+            // threads run to hide the memory latency.
             var near = queued_four(queue);
             var far = queued_four(queue + 4u);
             for (var i = AT_ONCE; i <= queued; i += AT_ONCE) {

@@ -1,9 +1,9 @@
 // colors: the colors of the visible splats of one part; the third pass of tile bins.
-// In: the visible splats, which `project_bin` listed; color coefficients, an instance. Out: the colors of the splats. CPU reference:
-// src/reference/project.rs.
+// In: the visible splats, which `project_bin` listed; color coefficients, an instance. Out: the colors of the splats.
+// CPU reference: src/reference/project.rs.
 //
-// SHARES neighboring threads compute the partial sums (shares) of one color: there are too few visible splats to occupy all threads of a
-// large GPU, and the coefficients that these threads read are contiguous.
+// SHARES neighboring threads compute the partial sums (shares) of one color: there are too few visible splats to occupy
+// all threads of a large GPU, and the coefficients that these threads read are contiguous.
 #import gs4d::types::{VisibleSplat, BIN_COUNTERS, DEBUG_ACTIVE}
 #import gs4d::capture::instance
 #ifdef COPIED_INSTANCE

@@ -1,6 +1,6 @@
 // fill_bins: puts the visible splats into bins that `place_bins` has placed.
-// In: splats, the list of the visible splats, the index of the first entry of each bin. Out: unordered bins; the index after the last entry of
-// each bin. Entries beyond the end of the buffer are not written.
+// In: splats, the list of the visible splats, the index of the first entry of each bin. Out: unordered bins; the index
+// after the last entry of each bin. Entries beyond the end of the buffer are not written.
 #import gs4d::types::{FrameUniforms, SplatShape, VisibleSplat, BIN_COUNTERS}
 #import gs4d::bins::{depth_order, stamp, STAMP_MASK}
 #import gs4d::filling::{begin_filling, bin_entries, count_splat, filling_of, put_splat, put_wide_splats, reserve_entries}
@@ -26,7 +26,7 @@ fn fill_bins(
         var key = 0u;
         if first + thread < frame.slots {
             let words = visible[first + thread].words;
-            // The list of a part may end before its last slot; what follows belongs to earlier frames.
+            // The list of a part may end before its last slot; the entries after it are those of earlier frames.
             if all((words.zw & vec2(STAMP_MASK)) == stamp(frame.binning.x >> 8u)) {
                 let corners = words.zw & vec2(~STAMP_MASK);
                 tiles = vec4(corners.x & 0xffffu, corners.x >> 16u, corners.y & 0xffffu, corners.y >> 16u);

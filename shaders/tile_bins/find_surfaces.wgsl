@@ -1,6 +1,8 @@
-// find_surfaces: finds the farthest opaque surface of each tile, one workgroup per 2 x 2 tiles; before `project_bin`, in frames behind surfaces.
-// In: the depth of opaque surfaces. Out: the depth order of the farthest surface of each tile, by which `project_bin` leaves out splats that
-// no pixel of their tiles shows, and of the picture, by which it leaves out Gaussians before it projects them.
+// find_surfaces: finds the farthest opaque surface of each tile, one workgroup per 2 x 2 tiles; before `project_bin`,
+// in frames with opaque surfaces.
+// In: the depth of opaque surfaces. Out: the depth order of the farthest surface of each tile, by which `project_bin`
+// leaves out splats that no pixel of their tiles shows, and of the picture, by which it leaves out Gaussians before it
+// projects them.
 #import gs4d::bins::depth_order
 #ifdef MULTISAMPLED
 #import gs4d::pixel::{frame, surface_range}

@@ -1,6 +1,7 @@
-// place_bins: gives each bin room for exactly the splats that `project_bin` has counted, one bin after the other; one workgroup.
-// In: the number of splats of each bin. Out: the index of the first entry of each bin. Only for frames whose bins differ too much to have room
-// for the same number of splats; `fill_bins` writes the entries.
+// place_bins: gives each bin room for exactly the splats that `project_bin` has counted, one bin after the other; one
+// workgroup.
+// In: the number of splats of each bin. Out: the index of the first entry of each bin. Only for frames whose bins
+// differ too much to have room for the same number of splats; `fill_bins` writes the entries.
 #import gs4d::types::{FrameUniforms, BIN_COUNTERS}
 #import gs4d::scan::{exclusive_scan, saturating_add}
 

@@ -1,6 +1,8 @@
-// project_bin: slices each Gaussian at the view's time, projects it, and puts its splat into the bins that it covers; the first pass of tile bins.
-// In: Gaussians, an instance, a list of active Gaussians, with OPAQUE the surfaces of `find_surfaces`. Out: splats without color, the list of the visible splats, and unordered bins of a
-// few tiles, or if they have no room yet, the number of splats of each bin. CPU reference: src/reference/project.rs with src/gaussian/projection.rs.
+// project_bin: slices each Gaussian at the view's time, projects it, and puts its splat into the bins that it covers;
+// the first pass of tile bins.
+// In: Gaussians, an instance, a list of active Gaussians, with OPAQUE the surfaces of `find_surfaces`. Out: splats
+// without color, the list of the visible splats, and unordered bins of a few tiles, or if they have no room yet, the
+// number of splats of each bin. CPU reference: src/reference/project.rs with src/gaussian/projection.rs.
 #import gs4d::types::{SplatShape, VisibleSplat, BIN_COUNTERS, DEBUG_ACTIVE, INVISIBLE}
 #import gs4d::bins::{depth_order, stamp}
 #import gs4d::capture::{index_of, instance, viewing_direction}
@@ -29,8 +31,8 @@
 const TESTED_TILES: u32 = 256u;
 #endif
 
-// Indices of the workgroup's Gaussians that are present, relative to its first, two per word. The host assigns at most four Gaussians to
-// each thread.
+// Indices of the workgroup's Gaussians that are present, relative to its first, two per word. The host assigns at most
+// four Gaussians to each thread.
 var<workgroup> present: array<atomic<u32>, 512>;
 var<workgroup> present_count: atomic<u32>;
 var<workgroup> own_visible: atomic<u32>;
@@ -39,8 +41,8 @@ var<workgroup> own_pairs: atomic<u32>;
 var<workgroup> visible_before: u32;
 
 #ifdef OPAQUE
-// Depth order of the farthest surface of the picture, behind which no Gaussian is projected. The test costs time where it leaves out few: NEVER
-// unless the center of the instance is behind that surface.
+// Depth order of the farthest surface of the picture, behind which no Gaussian is projected. The test costs time where
+// it leaves out few: NEVER unless the center of the instance is behind that surface.
 var<workgroup> hidden_from: u32;
 const NEVER: u32 = 0xffffffffu;
 // Relative margin of the depth of that test: more than its rounding.
@@ -65,7 +67,8 @@ fn is_hidden(tiles: vec4<u32>, key: u32) -> bool {
 }
 #endif
 
-// Returns the bins that are filled, each with room for the same number of splats. Without room, splats are only counted.
+// Returns the bins that are filled, each with room for the same number of splats. Without room, splats are only
+// counted.
 fn filled() -> Filling {
     let capacity = instance.binning.y;
     return filling_of(instance.tiles, instance.binning.x & 0xffu, BIN_COUNTERS + instance.binning.w, capacity, capacity);
@@ -120,8 +123,8 @@ fn project_bin(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocatio
     }
 }
 
-// Projects the Gaussian at index `place` of the `count` Gaussians that are present, and writes its splat into its bins. All threads of the
-// workgroup must call this function.
+// Projects the Gaussian at index `place` of the `count` Gaussians that are present, and writes its splat into its bins.
+// All threads of the workgroup must call this function.
 fn project_and_bin(first_of_group: u32, place: u32, count: u32, thread: u32) {
     let filling = filled();
     // First and last + 1 tile, and `seen` of VisibleSplat.

@@ -1,12 +1,13 @@
 // sort_bins: sorts the splats of one bin by depth, one workgroup per bin; the second pass of tile bins.
-// In: the unordered bins that `project_bin` or `fill_bins` filled. Out: the pairs of each tile in order of depth, then slot, and the range of each
-// tile; the counters of the next frame, cleared. If the buffers are too small for the splats of a bin or for the pairs of its tiles, their
-// ranges are NONE: `blend_blocks` searches all splats instead.
+// In: the unordered bins that `project_bin` or `fill_bins` filled. Out: the pairs of each tile in order of depth, then
+// slot, and the range of each tile; the counters of the next frame, cleared. If the buffers are too small for the
+// splats of a bin or for the pairs of its tiles, their ranges are NONE: `blend_blocks` searches all splats instead.
 //
-// The list is sorted in workgroup memory: into buckets, then by rank in each bucket. Most depths of a bin may be close together, so
-// the splats are first counted in a histogram of equal steps of depth, and the buckets are chosen to have about equal numbers of splats. A
-// list longer than LIST is sorted in rounds of ROUND splats, the nearest first. If bins are counted before they are filled (COUNTED), some
-// lists are much longer than others: their entries are first copied in order of parts, and read part by part.
+// The list is sorted in workgroup memory: into buckets, then by rank in each bucket. Most depths of a bin may be close
+// together, so the splats are first counted in a histogram of equal steps of depth, and the buckets are chosen to have
+// about equal numbers of splats. A list longer than LIST is sorted in rounds of ROUND splats, the nearest first. If
+// bins are counted before they are filled (COUNTED), some lists are much longer than others: their entries are first
+// copied in order of parts, and read part by part.
 #import gs4d::types::{FrameUniforms, BIN_COUNTERS}
 #import gs4d::bins::{is_after, FIRST, NONE, SLOT_MASK}
 #import gs4d::nearest::{begin_search, clear_intervals, count_candidate, next_search}
@@ -52,11 +53,11 @@ var<workgroup> last_end: atomic<u32>;
 var<workgroup> next_end: atomic<u32>;
 #endif
 
-// Before sorting: the depth keys of the list, unordered; in rounds also the second words of its entries, from ROUND on. After sorting: the
-// second words, in order. The key at LIST is greater than all others.
+// Before sorting: the depth keys of the list, unordered; in rounds also the second words of its entries, from ROUND on.
+// After sorting: the second words, in order. The key at LIST is greater than all others.
 var<workgroup> list: array<u32, LIST + 1u>;
-// Low half: the index of a splat in its bucket, then its rank in the order. High half: the splat at this index of all buckets, followed by
-// LIST.
+// Low half: the index of a splat in its bucket, then its rank in the order. High half: the splat at this index of all
+// buckets, followed by LIST.
 var<workgroup> places: array<atomic<u32>, LIST + 1u>;
 // Number of splats of each step, then number of splats in earlier steps.
 var<workgroup> steps: array<atomic<u32>, STEPS + 1u>;
@@ -97,8 +98,8 @@ fn load_entry(i: u32) -> vec2<u32> {
     return bin_entries[i];
 }
 
-// Returns entries `i`, `i + THREADS`, .. of a bin of `count` entries; indices are clamped to the last. The entries are loaded at once, so that
-// a thread waits for memory once.
+// Returns entries `i`, `i + THREADS`, .. of a bin of `count` entries; indices are clamped to the last. The entries are
+// loaded at once, so that a thread waits for memory once.
 fn four_entries(first: u32, i: u32, count: u32) -> FourEntries {
     let at = first + min(vec4(i) + THREADS * vec4(0u, 1u, 2u, 3u), vec4(count - 1u));
     let a = load_entry(at.x);
@@ -108,8 +109,8 @@ fn four_entries(first: u32, i: u32, count: u32) -> FourEntries {
     return FourEntries(vec4(a.x, b.x, c.x, d.x), vec4(a.y, b.y, c.y, d.y));
 }
 
-// Lists all entries from `first` to `first + count` if `whole`, otherwise the entries after `lower` and not after `upper`, which fit into a
-// round. Returns their number.
+// Lists all entries from `first` to `first + count` if `whole`, otherwise the entries after `lower` and not after
+// `upper`, which fit into a round. Returns their number.
 fn collect(first: u32, count: u32, whole: bool, lower: vec2<u32>, upper: vec2<u32>, thread: u32) -> u32 {
     workgroupBarrier();
     if thread == 0u {
@@ -170,7 +171,8 @@ fn last_fitting(first: u32, count: u32, lower: vec2<u32>, thread: u32) -> vec2<u
     return search.last;
 }
 
-// Returns the sum of the values of all threads before this one. A value may hold two 16-bit numbers whose sums stay below 65536.
+// Returns the sum of the values of all threads before this one. A value may hold two 16-bit numbers whose sums stay
+// below 65536.
 fn sum_before(value: u32, thread: u32) -> u32 {
     var sum = 0u;
 #ifdef SUBGROUPS_OF_32
@@ -205,14 +207,16 @@ fn sum_before(value: u32, thread: u32) -> u32 {
     return sum;
 }
 
-// Returns the width of a step as a power of two: the least with which keys up to `range` above the least key are in STEPS steps.
+// Returns the width of a step as a power of two: the least with which keys up to `range` above the least key are in
+// STEPS steps.
 fn step_width(range: u32) -> u32 {
     return max(32u - countLeadingZeros(range), STEP_BITS) - STEP_BITS;
 }
 
-// Returns the bucket of a key that is `offset` above the least key, below BUCKETS. It increases monotonically with the key. `width` is the
-// result of `step_width`, `factor` is (BUCKETS << FACTOR_BITS) / the number of keys. The bucket is computed from integers: drivers may round
-// floating-point expressions differently in each place where they inline this function.
+// Returns the bucket of a key that is `offset` above the least key, below BUCKETS. It increases monotonically with the
+// key. `width` is the result of `step_width`, `factor` is (BUCKETS << FACTOR_BITS) / the number of keys. The bucket is
+// computed from integers: drivers may round floating-point expressions differently in each place where they inline this
+// function.
 fn bucket_of(offset: u32, width: u32, factor: u32) -> u32 {
     let first = atomicLoad(&steps[offset >> width]);
     let count = atomicLoad(&steps[(offset >> width) + 1u]) - first;
@@ -363,8 +367,8 @@ fn quarters(low: u32, high: u32) -> vec4<u32> {
     return vec4(low & 0xffffu, low >> 16u, high & 0xffffu, high >> 16u);
 }
 
-// Returns the sums of eight 16-bit numbers, two per word, over all threads before this one. Writes the sums over all threads to the totals of
-// tiles `number` to `number + 8`.
+// Returns the sums of eight 16-bit numbers, two per word, over all threads before this one. Writes the sums over all
+// threads to the totals of tiles `number` to `number + 8`.
 fn sums_before(eight: vec4<u32>, number: u32, thread: u32) -> vec4<u32> {
     var before: vec4<u32>;
 #ifdef SUBGROUPS_OF_32
@@ -392,8 +396,8 @@ fn sums_before(eight: vec4<u32>, number: u32, thread: u32) -> vec4<u32> {
     return before;
 }
 
-// Returns the number of pairs of earlier threads with each tile of the bin, two per word: tiles 0 to 7, then 8 to 15. `own` is the number of
-// pairs of this thread, one byte per tile.
+// Returns the number of pairs of earlier threads with each tile of the bin, two per word: tiles 0 to 7, then 8 to 15.
+// `own` is the number of pairs of this thread, one byte per tile.
 fn pairs_before(own: vec4<u32>, thread: u32) -> array<vec4<u32>, 2> {
     var before = array(sums_before(halves(own.xy), 0u, thread), vec4(0u));
     if side() == 4u {
@@ -402,8 +406,9 @@ fn pairs_before(own: vec4<u32>, thread: u32) -> array<vec4<u32>, 2> {
     return before;
 }
 
-// Reserves room for pairs. Returns the first pair; NONE if there is too little room. The counter cannot wrap: `project_bin` has counted the
-// pairs of the frame, and none are written if they are 2^32 or more. A loop of compare and exchange makes all bins wait for one another.
+// Reserves room for pairs. Returns the first pair; NONE if there is too little room. The counter cannot wrap:
+// `project_bin` has counted the pairs of the frame, and none are written if they are 2^32 or more. A loop of compare
+// and exchange would make all bins wait for one another.
 fn reserve_pairs(count: u32) -> u32 {
     if bins[1] > 0u {
         return NONE.x;
@@ -534,8 +539,8 @@ fn reserve_all(first: u32, count: u32, corner: vec2<u32>, thread: u32) {
 }
 
 #ifdef COUNTED
-// Returns the part, below THREADS, of the splats of a bin that a key is in which is `offset` above the least key: `each` splats or about as
-// many, in order of depth. `steps` has the numbers of splats in earlier steps.
+// Returns the number, below THREADS, of the part of a bin that contains the key `offset` above the least key. A part
+// has about `each` splats; parts are in order of depth. `steps` has the numbers of splats in earlier steps.
 fn part_of(offset: u32, width: u32, each: u32) -> u32 {
     let before = atomicLoad(&steps[offset >> width]);
     let count = atomicLoad(&steps[(offset >> width) + 1u]) - before;
@@ -589,8 +594,8 @@ fn order_parts(first: u32, count: u32, thread: u32) -> u32 {
     return before + own;
 }
 
-// Returns the end of the last part after `begin` up to which the entries fit into a list; if none fits, of the first. `end` is the end of the
-// part that has the number of the thread.
+// Returns the end of the last part after `begin` up to which the entries fit into a list; if none fits, of the first.
+// `end` is the end of the part that has the number of the thread.
 fn end_of_round(begin: u32, end: u32, thread: u32) -> u32 {
     if thread == 0u {
         atomicStore(&last_end, 0u);
@@ -607,7 +612,7 @@ fn end_of_round(begin: u32, end: u32, thread: u32) -> u32 {
 }
 #endif
 
-// Sorts a list of the entries of a bin, all of which have been reserved pairs, in rounds.
+// Sorts entries of a bin, for which pairs have been reserved, in rounds.
 fn sort_in_rounds(first: u32, all: u32, corner: vec2<u32>, thread: u32) {
     // The last position that has been sorted, and the number of entries up to it.
     var lower = FIRST;

@@ -1,8 +1,8 @@
 //! Alpha: the opacity of a splat at a pixel, and the step that blends it.
 //!
-//! In: conic and opacity of a splat, the offset of a pixel from its center, the remaining transmittance of the pixel. Out:
-//! its alpha, or the result of blending it ([`BlendStep`]), as the original rasterizer computes them. The CPU reference
-//! of `shaders/shared/alpha.wgsl`; picking uses [`visible`] too.
+//! In: conic and opacity of a splat, the offset of a pixel from its center, the remaining transmittance of the pixel.
+//! Out: its alpha, or the result of blending it ([`BlendStep`]), as the original rasterizer computes them. The CPU
+//! reference of `shaders/shared/alpha.wgsl`; picking uses [`visible`] too.
 
 use super::conic::exponent;
 use glam::{Vec2, Vec3};

@@ -1,17 +1,19 @@
 //! The covariance of a splat on the screen and its inverse, the conic.
 //!
-//! In: a covariance in capture space and the rows of the projection. Out: the covariance on the screen with the low-pass, its
-//! determinant, and the conic in factored form, all of them finite and positive definite. The CPU reference of
-//! `shaders/shared/conic.wgsl`.
+//! In: a covariance in capture space and the rows of the projection. Out: the covariance on the screen with the
+//! low-pass, its determinant, and the conic in factored form, all of them finite and positive definite. The CPU
+//! reference of `shaders/shared/conic.wgsl`.
 //!
-//! Both the determinant and the exponent of a splat cancel if they are computed from the entries of the covariance or its inverse. The
-//! splat of a needle 300 pixels long would have an alpha with an error of 0.05. Therefore the conic is kept factored,
+//! Both the determinant and the exponent of a splat cancel if they are computed from the entries of the covariance or
+//! its inverse. The splat of a needle 300 pixels long would have an alpha with an error of 0.05. Therefore the conic is
+//! kept factored,
 //!
 //! ```text
 //! dᵀ Σ⁻¹ d = x (dx + y dy)² + z dy²        x = Σyy / det,  y = −Σxy / Σyy,  z = 1 / Σyy
 //! ```
 //!
-//! a sum of two squares, and the determinant of a thin splat is computed from the cofactors of the covariance in capture space.
+//! a sum of two squares, and the determinant of a thin splat is computed from the cofactors of the covariance in
+//! capture space.
 
 use glam::{Mat3, Vec2, Vec3};
 
@@ -32,8 +34,8 @@ pub struct ScreenCovariance {
 }
 
 impl ScreenCovariance {
-    /// Projects a covariance by the rows of the projection, pixels per unit; `None` above [`MAX_VARIANCE`], or if a value is
-    /// not finite. Negative variances, which rounding can produce, count as 0.
+    /// Projects a covariance by the rows of the projection, pixels per unit; `None` above [`MAX_VARIANCE`], or if a
+    /// value is not finite. Negative variances, which rounding can produce, count as 0.
     pub fn project(covariance: Mat3, row_x: Vec3, row_y: Vec3) -> Option<Self> {
         let (cx, cy) = (covariance * row_x, covariance * row_y);
         let (xx, xy, yy) = (row_x.dot(cx).max(0.0) + LOW_PASS, row_x.dot(cy), row_y.dot(cy).max(0.0) + LOW_PASS);
@@ -62,8 +64,8 @@ impl ScreenCovariance {
     }
 }
 
-/// Returns the determinant of the covariance on the screen without the low-pass, between 0 and `most`: `nᵀ adj(Σ) n` with
-/// the cross product n of the rows and the cofactors adj(Σ).
+/// Returns the determinant of the covariance on the screen without the low-pass, between 0 and `most`: `nᵀ adj(Σ) n`
+/// with the cross product n of the rows and the cofactors adj(Σ).
 fn flat_determinant(covariance: Mat3, row_x: Vec3, row_y: Vec3, most: f32) -> f32 {
     let [xx, xy, xz, _, yy, yz, _, _, zz] = covariance.to_cols_array();
     let squares =
@@ -104,7 +106,8 @@ mod tests {
     use super::*;
     use glam::{DMat3, DVec2, DVec3, Quat};
 
-    /// Returns the covariance of a needle `length` long and 1e-3 wide, in a direction that is none of the axes, in single precision.
+    /// Returns the covariance of a needle `length` long and 1e-3 wide, in a direction that is none of the axes, in
+    /// single precision.
     fn needle(length: f32) -> Mat3 {
         let axes = Mat3::from_quat(Quat::from_xyzw(0.3, -0.5, 0.2, 0.6).normalize());
         let scaled = axes * Mat3::from_diagonal(Vec3::new(length, 1e-3, 1e-3));

@@ -4,8 +4,8 @@
 
 use glam::{DMat4, DVec4};
 
-/// Returns eigenvalues and eigenvectors (columns) of a symmetric matrix, by Jacobi rotations. Zero off-diagonal
-/// entries are skipped, so that a 3D matrix in the first three rows and columns is decomposed by itself.
+/// Returns eigenvalues and eigenvectors (columns) of a symmetric matrix, by Jacobi rotations. Zero off-diagonal entries
+/// are skipped, so that a 3D matrix in the first three rows and columns is decomposed by itself.
 pub(crate) fn eigen(mut a: DMat4) -> (DVec4, DMat4) {
     let mut vectors = DMat4::IDENTITY;
     // Convergence is quadratic: these sweeps are more than enough.

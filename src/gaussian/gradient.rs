@@ -1,12 +1,12 @@
 //! The gradient of a Gaussian: from its splat back to its raw parameters. The CPU reference of
 //! `shaders/offline/project_backward.wgsl`.
 //!
-//! In: the raw [`Parameters`] and [`Harmonics`] of one Gaussian, a [`View`], and the gradient of a loss with respect
-//! to its splat ([`SplatGradient`]). Out: the gradient with respect to each raw parameter ([`ParameterGradient`]), in
+//! In: the raw [`Parameters`] and [`Harmonics`] of one Gaussian, a [`View`], and the gradient of a loss with respect to
+//! its splat ([`SplatGradient`]). Out: the gradient with respect to each raw parameter ([`ParameterGradient`]), in
 //! double precision: back through color, projection, slice and activation, as in sections 7.2 to 7.5 of the 4DGS model.
 //!
-//! Decisions are held constant: which Gaussians are not drawn, and which rays and colors are clamped. `g_x` is the gradient with respect to
-//! `x`.
+//! Decisions are held constant: which Gaussians are not drawn, and which rays and colors are clamped. `g_x` is the
+//! gradient with respect to `x`.
 
 use super::conic::LOW_PASS;
 use super::projection::FRUSTUM_CLAMP;
@@ -78,8 +78,7 @@ impl AddAssign for SplatGradient {
     }
 }
 
-/// The gradient of a loss with respect to the raw parameters of one Gaussian; zero for parameters that its model
-/// lacks.
+/// The gradient of a loss with respect to the raw parameters of one Gaussian; zero for parameters that its model lacks.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ParameterGradient {
     /// With respect to the mean μ.
@@ -103,7 +102,8 @@ pub struct ParameterGradient {
 /// Returns the gradient with respect to the raw parameters of the Gaussian at `index`, from that with respect to its
 /// splat in `view`.
 ///
-/// The factor of anti-aliasing on opacity counts as constant and as 1, unless it is that of Mip-Splatting (a training pixel of 0).
+/// The factor of anti-aliasing on opacity counts as constant and as 1, unless it is that of Mip-Splatting (a training
+/// pixel of 0).
 ///
 /// A Gaussian that is not drawn has no pixel, so that `splat` is zero; then the result is zero too. In an orthographic
 /// view the direction of the color and the Jacobian of the projection are constant, and the result is as exact as in
@@ -139,8 +139,8 @@ pub fn parameter_gradient(
     gradient
 }
 
-/// Returns the gradient with respect to the raw parameters of the Gaussian at `index`, from that of a loss that does not
-/// depend on a view: with respect to its velocity c/v and its peak opacity. Coefficients of color are omitted.
+/// Returns the gradient with respect to the raw parameters of the Gaussian at `index`, from that of a loss that does
+/// not depend on a view: with respect to its velocity c/v and its peak opacity. Coefficients of color are omitted.
 ///
 /// # Panics
 /// As [`parameter_gradient`].
@@ -155,8 +155,8 @@ pub fn slice_gradient(parameters: &Parameters, index: usize, velocity: DVec3, op
 
 /// A Gaussian at the time of a view, activated and sliced in double precision (section 2 of the 4DGS model).
 ///
-/// All models have one form here: a 3D rotation is the 4D rotation by two equal quaternions, which does not change time,
-/// and a Gaussian that is present at every time is always at its temporal mean.
+/// All models have one form here: a 3D rotation is the 4D rotation by two equal quaternions, which does not change
+/// time, and a Gaussian that is present at every time is always at its temporal mean.
 struct Moment {
     model: Model,
     /// Mean μ, capture space.
@@ -255,8 +255,8 @@ impl Quaternion {
     }
 }
 
-/// Returns the quaternion that, as both quaternions of a 4D rotation, rotates space as `q` (w, x, y, z) does:
-/// (w, −z, −y, −x). This map is its own inverse, and its own transpose.
+/// Returns the quaternion that, as both quaternions of a 4D rotation, rotates space as `q` (w, x, y, z) does: (w, −z,
+/// −y, −x). This map is its own inverse, and its own transpose.
 fn at_rest(q: DVec4) -> DVec4 {
     DVec4::new(q.x, -q.w, -q.z, -q.y)
 }
@@ -336,8 +336,9 @@ fn through_projection(
     (g_covariance, g_mean, factor)
 }
 
-/// Returns the factor of the filter of Mip-Splatting on the opacity of a splat with this covariance on the screen (xx, xy, yy, with the low-pass),
-/// and the gradient with respect to that covariance, from that with respect to the factor; 1 and zero in a view without this filter.
+/// Returns the factor of the filter of Mip-Splatting on the opacity of a splat with this covariance on the screen (xx,
+/// xy, yy, with the low-pass), and the gradient with respect to that covariance, from that with respect to the factor;
+/// 1 and zero in a view without this filter.
 fn through_filter(view: &View, [a, b, c]: [f64; 3], g_factor: f64) -> (f64, [f64; 3]) {
     if view.trained_pixel != 0.0 {
         return (1.0, [0.0; 3]);
@@ -443,7 +444,8 @@ fn through_slice(
 ) -> ParameterGradient {
     let Moment { model, dt, coupling: c, variance_t: v, variance_marginal, marginal, opacity, .. } = *gaussian;
     let compat = settings.mode == GradientMode::Compat;
-    // Without a 4D rotation the original has no gradient through the marginal, and omits it as a factor on that of the opacity.
+    // Without a 4D rotation the original has no gradient through the marginal, and omits it as a factor on that of the
+    // opacity.
     let ignores_marginal = compat && model != Model::Rotated4d;
     let (g_opacity, g_exponent) = if ignores_marginal {
         (g_splat_opacity, 0.0)

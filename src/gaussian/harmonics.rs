@@ -5,13 +5,15 @@
 
 use glam::Vec3;
 
-/// The largest color: the largest half-precision number, as in HDR view targets. As in `shaders/shared/appearance.wgsl`.
+/// The largest color: the largest half-precision number, as in HDR view targets. As in
+/// `shaders/shared/appearance.wgsl`.
 pub const BRIGHTEST: f32 = 65504.0;
 
 /// Color coefficients of `N` Gaussians.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Harmonics {
-    /// Coefficients stored per Gaussian and channel, K. Time-major: 16 spatial, 16 of the first harmonic, 16 of the second.
+    /// Coefficients stored per Gaussian and channel, K. Time-major: 16 spatial, 16 of the first harmonic, 16 of the
+    /// second.
     pub coefficients: usize,
     /// Spatial degree evaluated, 0 to 3.
     pub degree: u32,

@@ -3,14 +3,15 @@
 //! In: a temporal mean and deviation, a time. Out: the marginal at that time; the limits below which a Gaussian is not
 //! drawn.
 
-/// A Gaussian is drawn only at times at which its marginal is above this value (strict, as in the original), unless its scene has another one.
+/// A Gaussian is drawn only at times at which its marginal is above this value (strict, as in the original), unless its
+/// scene has another one.
 pub const MARGINAL_CUTOFF: f32 = 0.05;
 
 /// The smallest cut-off: a splat with a lower marginal has an alpha below 1/255, which is never drawn.
 pub const SMALLEST_CUTOFF: f32 = 1.0 / 255.0;
 
-/// Returns the distance in time from the temporal mean at which the marginal falls to the cut-off, in temporal deviations: sqrt(−2 ln cutoff),
-/// rounded up.
+/// Returns the distance in time from the temporal mean at which the marginal falls to the cut-off, in temporal
+/// deviations: sqrt(−2 ln cutoff), rounded up.
 pub(crate) fn lifespan_reach(cutoff: f32) -> f64 {
     (-2.0 * f64::from(cutoff).ln()).sqrt() * 1.0001
 }

@@ -1,7 +1,8 @@
 //! Projection: from a Gaussian at a time to a splat on the screen (EWA splatting, as the original rasterizer does it).
 //!
 //! In: a [`Gaussian`] and a [`View`]. Out: [`Projected`]; `None` if the Gaussian is not drawn. The steps and their
-//! order are those of the original rasterizer, and of `shaders/global_sort/project.wgsl`; for thin and for very large splats see [`conic`](super::conic).
+//! order are those of the original rasterizer, and of `shaders/global_sort/project.wgsl`; for thin and for very large
+//! splats see [`conic`](super::conic).
 
 use super::conic::{LOW_PASS, ScreenCovariance};
 use super::lifespan::MARGINAL_CUTOFF;
@@ -91,11 +92,11 @@ pub fn project_with(gaussian: &Gaussian, view: &View, clip: &[Vec4; 2], cutoff: 
     })
 }
 
-/// Returns the factor on the opacity of a splat that the low-pass makes larger than it was in training: the square root of the ratio of
-/// the determinants of its covariances, so that the integral of its alpha stays the same. The original has no such factor, so that
-/// distant captures look thicker. The factor is 1 up to the size of a pixel in training, and in every view without anti-aliasing. With a
-/// pixel of size 0 the factor is that of Mip-Splatting, which is a part of its training.
-/// `per_unit` is in pixels per camera unit.
+/// Returns the factor on the opacity of a splat that the low-pass makes larger than it was in training: the square root
+/// of the ratio of the determinants of its covariances, so that the integral of its alpha stays the same. The original
+/// has no such factor, so that distant captures look thicker. The factor is 1 where pixels are no larger than in
+/// training, and in every view without anti-aliasing. With a pixel of size 0 the factor is that of Mip-Splatting, which
+/// is a part of its training. `per_unit` is in pixels per camera unit.
 fn compensation(view: &View, per_unit: Vec2, screen: &ScreenCovariance) -> f32 {
     let trained = view.trained_variance() * LOW_PASS * per_unit * per_unit;
     let wider = (LOW_PASS - trained).max(Vec2::ZERO);

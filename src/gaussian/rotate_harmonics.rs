@@ -1,10 +1,12 @@
-//! Colors of Gaussians that are turned.
+//! Rotation of the colors of Gaussians.
 //!
-//! In: colors and a rotation or reflection of space. Out: the colors with which a turned Gaussian looks from a turned direction as it did before.
+//! In: colors and a rotation or reflection of space. Out: colors that have in each rotated direction the value of the
+//! given colors in the direction before the rotation.
 //!
-//! The harmonics of one degree at `R d` are a linear combination of those at `d`, `Y(R d) = D Y(d)`. They are orthonormal, so
-//! `D = ∫ Y(R d) Y(d)ᵀ`, an integral of polynomials of at most degree 6 over the sphere, for which 32 directions suffice: four heights
-//! by Gauss and Legendre, eight angles each. `D` is orthogonal, and the coefficients `D c` have at `R d` the color of `c` at `d`.
+//! The harmonics of one degree at `R d` are linear combinations of those at `d`, `Y(R d) = D Y(d)`. They are
+//! orthonormal, so `D = ∫ Y(R d) Y(d)ᵀ`, an integral of polynomials of at most degree 6 over the sphere, for which 32
+//! directions suffice: four heights by Gauss and Legendre, eight angles each. `D` is orthogonal, and the coefficients
+//! `D c` have at `R d` the color of `c` at `d`.
 
 use super::harmonics::{Harmonics, basis};
 use glam::{DMat3, DVec3};
@@ -22,10 +24,10 @@ const HEIGHTS: [(f64, f64); 4] = [
 /// Number of angles around each height.
 const ANGLES: u32 = 8;
 
-/// Entries nearer than this to 0, 1 or −1 are these numbers, so that an exchange of axes changes no digit.
+/// Entries closer than this to 0, 1 or −1 are rounded to these numbers, so that an exchange of axes is exact.
 const EXACT: f64 = 1e-6;
 
-/// Turns colors by an orthogonal matrix, also one that mirrors.
+/// Rotates colors by an orthogonal matrix, which may include a reflection.
 pub(crate) fn rotate_harmonics(harmonics: &mut Harmonics, turn: DMat3) {
     let degree = (harmonics.degree as usize).min(3);
     let stride = harmonics.coefficients * 3;
@@ -44,7 +46,7 @@ pub(crate) fn rotate_harmonics(harmonics: &mut Harmonics, turn: DMat3) {
     });
 }
 
-/// Turns the coefficients of degree `l` in a block of coefficients.
+/// Rotates the coefficients of degree `l` in a block of coefficients.
 fn rotate_band(block: &mut [f32], l: usize, matrix: &[[f32; 16]; 16]) {
     let (first, end) = (l * l, (l + 1) * (l + 1));
     let mut turned = [[0.0_f32; 3]; 7];
@@ -59,7 +61,7 @@ fn rotate_band(block: &mut [f32], l: usize, matrix: &[[f32; 16]; 16]) {
     block[first * 3..end * 3].copy_from_slice(&turned[..(end - first) * 3]);
 }
 
-/// Returns the matrices of all degrees on the diagonal of one; the entries between degrees, which are zero, are not used.
+/// Returns the block-diagonal matrix of all degrees; its zero entries between degrees are not used.
 fn matrix(turn: DMat3) -> [[f32; 16]; 16] {
     let mut sums = [[0.0_f64; 16]; 16];
     for (z, weight) in HEIGHTS {
@@ -94,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn a_turned_direction_sees_the_turned_color() {
+    fn rotated_colors_seen_in_a_rotated_direction_are_unchanged() {
         let turn = DMat3::from_quat(DQuat::from_xyzw(0.3, -0.5, 0.1, 0.8).normalize());
         let mirror = DMat3::from_diagonal(DVec3::new(1.0, 1.0, -1.0));
         let exchange = DMat3::from_cols(DVec3::X, DVec3::Z, DVec3::Y);
@@ -119,12 +121,12 @@ mod tests {
     }
 
     #[test]
-    fn a_turn_by_half_a_circle_about_an_axis_changes_signs_alone() {
+    fn a_half_turn_about_an_axis_changes_only_signs() {
         let before = colors(3, 0, 16);
         let mut after = before.clone();
         rotate_harmonics(&mut after, DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0)));
         for (index, (after, before)) in after.values.iter().zip(&before.values).enumerate() {
-            assert_eq!(after.abs(), before.abs(), "value {index}: no digit changes");
+            assert_eq!(after.abs(), before.abs(), "value {index} changes only its sign");
         }
         let signs: Vec<f32> = (0..16).map(|k| (after.values[k * 3] / before.values[k * 3]).signum()).collect();
         let expected = [1, -1, -1, 1, -1, 1, 1, -1, 1, -1, 1, -1, -1, 1, -1, 1].map(|sign: i8| f32::from(sign));

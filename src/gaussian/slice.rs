@@ -182,7 +182,7 @@ impl Gaussian {
         } else if !finite(&self.covariance) {
             Err("a scale that is not finite or too large")
         } else if !self.has_covariance() {
-            Err("numbers in place of a covariance that no covariance has")
+            Err("a covariance that is not positive semidefinite")
         } else if !(0.0..=1.0).contains(&self.opacity) {
             Err("an opacity that is not a number between 0 and 1")
         } else {
@@ -199,8 +199,8 @@ impl Gaussian {
     }
 }
 
-/// Returns xx, xy, xz, yy, yz, zz of a covariance. Rounding of a difference of larger numbers can leave entries that no covariance has;
-/// these are moved to the nearest value that `0 ≤ σ_ii` and `σ_ij² ≤ σ_ii σ_jj` allow.
+/// Returns xx, xy, xz, yy, yz, zz of a covariance. Rounding of a difference of larger numbers can leave entries that
+/// are not those of a covariance; these are moved to the nearest value that `0 ≤ σ_ii` and `σ_ij² ≤ σ_ii σ_jj` allow.
 fn upper_triangle(covariance: DMat3) -> [f64; 6] {
     let [x, y, z] = covariance.to_cols_array_2d();
     // Numbers that are not finite stay so, and are refused later.
@@ -271,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn a_matrix_that_is_no_covariance_is_refused() {
+    fn a_matrix_that_is_not_a_covariance_is_refused() {
         let good =
             one([0.1, 0.7, -0.3, 0.2], [-0.4, 0.2, 0.6, 0.9]).slice(&SliceSettings::default()).expect("valid")[0];
         let needle = Gaussian { covariance: [1.0, 1.0, 1.0, 1.0, 1.0, 1.0], ..good };
@@ -280,7 +280,7 @@ mod tests {
             [[-1e-3, 0.0, 0.0, 1.0, 0.0, 1.0], [1.0, 1.1, 0.0, 1.0, 0.0, 1.0], [1.0, 0.0, 0.0, 1.0, -3e38, 1.0]]
         {
             let found = Gaussian { covariance, ..good }.check();
-            assert!(found.is_err_and(|reason| reason.contains("covariance")), "{covariance:?} is no covariance");
+            assert!(found.is_err_and(|reason| reason.contains("covariance")), "{covariance:?} is not a covariance");
         }
     }
 

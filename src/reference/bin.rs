@@ -1,5 +1,5 @@
-//! `bin` and `ranges`: splat–tile pairs, and the range of each tile in them; CPU reference of `shaders/global_sort/bin.wgsl` and
-//! `shaders/global_sort/ranges.wgsl`.
+//! `bin` and `ranges`: splat–tile pairs, and the range of each tile in them; CPU reference of
+//! `shaders/global_sort/bin.wgsl` and `shaders/global_sort/ranges.wgsl`.
 //!
 //! In: splats and their order by depth. Out: [`Pair`]s in that order; and, from sorted pairs, one range for each tile.
 

@@ -1,4 +1,5 @@
-//! `blend`: front to back over each tile, as the original rasterizer does; CPU reference of `shaders/global_sort/blend.wgsl`.
+//! `blend`: front to back over each tile, as the original rasterizer does; CPU reference of
+//! `shaders/global_sort/blend.wgsl`.
 //!
 //! In: splats, sorted pairs and tile ranges, the background. Out: the [`Frame`].
 

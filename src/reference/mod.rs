@@ -1,9 +1,9 @@
 //! The CPU reference of every GPU pass of a frame, with the same names and in the same order.
 //!
-//! In: [`Layer`]s and a [`Background`](crate::view::Background). Out: a [`Frame`](crate::view::Frame). The passes are plain
-//! functions over slices and correspond to the files of `shaders/`: [`activate()`], [`project()`], `sort`, `bin`,
-//! `sort` again, `ranges`, `blend`, `motion()`. `blend_backward()` and `gradients` take the gradient of a loss
-//! on a frame back to the trained parameters.
+//! In: [`Layer`]s and a [`Background`](crate::view::Background). Out: a [`Frame`](crate::view::Frame). The passes are
+//! plain functions over slices and correspond to the files of `shaders/`: [`activate()`], [`project()`], `sort`, `bin`,
+//! `sort` again, `ranges`, `blend`, `motion()`. `blend_backward()` and `gradients` take the gradient of a loss on a
+//! frame back to the trained parameters.
 
 pub(crate) mod activate;
 pub(crate) mod bin;

@@ -7,8 +7,8 @@ use super::{Layer, Splat};
 use crate::view::View;
 use glam::Vec2;
 
-/// Returns the motion of every splat in pixels, to the right and down; 0 for an invisible splat, and for a splat that was not in front
-/// of the camera in the previous frame.
+/// Returns the motion of every splat in pixels, to the right and down; 0 for an invisible splat, and for a splat that
+/// was not in front of the camera in the previous frame.
 pub fn motion(layer: &Layer<'_>, splats: &[Splat], previous: &View) -> Vec<Vec2> {
     let [clip_x, clip_y] = previous.clip_rows();
     let size = layer.view.size.as_vec2();

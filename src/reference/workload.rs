@@ -86,7 +86,8 @@ mod tests {
             "all are blended while the pixel is transparent"
         );
         assert_eq!(of(&walls(5, 0.001)).contributing, 0.0, "splats with an alpha below 1/255 do not contribute");
-        // Each splat leaves a hundredth of the transmittance; the third would leave less than 1e-4, so blending stops before it.
+        // Each splat leaves a hundredth of the transmittance; the third would leave less than 1e-4, so blending stops
+        // before it.
         let found = of(&walls(50, 1.0));
         assert!(found.contributing < 4.0 && found.evaluated < 4.0, "blending stops at an opaque pixel: {found:?}");
     }

@@ -24,8 +24,9 @@ pub struct Bounds {
 
 impl Bounds {
     /// Returns the box that holds three standard deviations of every Gaussian wherever it is drawn within `interval`;
-    /// `None` if no Gaussian is drawn. A Gaussian is drawn while its marginal is above `cutoff`, and in its window if `filter` is one of
-    /// [windows](super::FilterKind::Window). Gaussians that cannot be drawn ([`Gaussian::check`]) are ignored.
+    /// `None` if no Gaussian is drawn. A Gaussian is drawn while its marginal is above `cutoff`, and in its window if
+    /// `filter` is one of [windows](super::FilterKind::Window). Gaussians that cannot be drawn ([`Gaussian::check`])
+    /// are ignored.
     pub fn of(
         gaussians: impl Iterator<Item = Gaussian>,
         interval: [f32; 2],
@@ -105,8 +106,8 @@ pub struct BoundsOverTime {
 
 impl BoundsOverTime {
     /// Returns the boxes that hold three standard deviations of every Gaussian wherever it is drawn, for 32 stretches
-    /// of `interval` (one, if the interval has no length); `None` if no Gaussian is drawn. Gaussians that cannot be drawn
-    /// ([`Gaussian::check`]) are ignored. A Gaussian is drawn as in [`Bounds::of`].
+    /// of `interval` (one, if the interval has no length); `None` if no Gaussian is drawn. Gaussians that cannot be
+    /// drawn ([`Gaussian::check`]) are ignored. A Gaussian is drawn as in [`Bounds::of`].
     pub fn of(
         gaussians: impl Iterator<Item = Gaussian>,
         interval: [f32; 2],
@@ -158,8 +159,8 @@ impl BoundsOverTime {
     }
 }
 
-/// Grows the boxes of all stretches in which a Gaussian is drawn. It moves in a straight line, so its positions at the
-/// ends of its time in a stretch bound those in between. It is drawn from the first to the last time given.
+/// Grows the boxes of all stretches in which a Gaussian is drawn, from time `from` to time `to`. The Gaussian moves in
+/// a straight line, so its positions at both ends of its time in a stretch bound those in between.
 fn cover(extents: &mut [Extent], gaussian: &Gaussian, [from, to]: [f64; 2], [start, end]: [f64; 2]) {
     let mean_t = f64::from(gaussian.mean_t);
     let (first, last) = (start.max(from), end.min(to));
@@ -282,9 +283,12 @@ mod tests {
         let window = TemporalFilter { kind: FilterKind::Window, segments: 10, count: 1, sets };
         let bounds = |filter| Bounds::of([runner()].into_iter(), [0.0, 1.0], MARGINAL_CUTOFF, filter).expect("drawn");
         let found = bounds(Some(&window));
-        assert!((found.min.x - 5.0).abs() < 0.1 && (found.max.x - 6.0).abs() < 0.1, "half a second to 0.6: {found:?}");
+        assert!(
+            (found.min.x - 5.0).abs() < 0.1 && (found.max.x - 6.0).abs() < 0.1,
+            "drawn from time 0.5 to 0.6: {found:?}"
+        );
         let other = TemporalFilter { kind: FilterKind::Interval, ..window.clone() };
-        assert_eq!(bounds(Some(&other)), bounds(None), "filters of other kinds say nothing about positions");
+        assert_eq!(bounds(Some(&other)), bounds(None), "a filter of another kind does not change the box");
     }
 
     #[test]
@@ -307,7 +311,7 @@ mod tests {
         let step = 1.0 / TIME_SPANS as f32;
         let [before, border, after] =
             [0.5, 1.0, 1.5].map(|place| bounds.at(place * step).expect("drawn at every time"));
-        assert_eq!(border, before.union(after), "the box around both stretches");
+        assert_eq!(border, before.union(after), "the box at a border is the box around both stretches");
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The conversion of a scene for drawing, at once or in steps.
 //!
-//! In: a [`GaussianScene`]. Out: a [`RuntimeScene`], whose Gaussians and colors can all be drawn. Trained Gaussians are sliced; colors are moved, not
-//! copied. Levels of detail are converted in the same way.
+//! In: a [`GaussianScene`]. Out: a [`RuntimeScene`], whose Gaussians and colors can all be drawn. Levels of detail are
+//! converted in the same way.
 
 use super::form::{Form, SceneForm, Trained};
 use super::gaussian_scene::GaussianScene;
@@ -36,7 +36,7 @@ pub(crate) struct Conversion {
     settings: SliceSettings,
     /// The Gaussians of a trained scene that have been sliced.
     sliced: Vec<Gaussian>,
-    /// Numbers of Gaussians and of values of color that can be drawn.
+    /// Numbers of Gaussians and of color values that have been converted or checked.
     gaussians: usize,
     values: usize,
     /// The size in pixels of the level that is being converted, and its conversion; the levels before and after it.
@@ -68,7 +68,7 @@ impl Conversion {
         Ok(Self { scene, settings, sliced, gaussians, values, level, before, after })
     }
 
-    /// Does one step, which converts about `bytes` at most. Returns whether there is more to do.
+    /// Does one step, which converts at most about `bytes`. Returns whether steps remain.
     ///
     /// # Errors
     /// The first Gaussian that cannot be drawn, or has a color coefficient that is not finite.

@@ -3,12 +3,12 @@
 //! In: the bounding sphere of a capture, its distance and a focal length; the sizes of levels. Out: the size of the
 //! capture on the screen, in pixels; an error unless the sizes of the levels decrease.
 
-/// Most levels of a scene.
+/// Largest number of levels of detail of a scene.
 pub const MAX_LEVELS: usize = 8;
 
-/// Returns the size on the screen of a capture: the diameter of the sphere around its bounds, seen at the center of a picture, in pixels.
-/// `radius` is that of the sphere and `distance` that of its center from the camera, in the same unit; `focal` is the focal length in
-/// pixels. Infinite if the camera is inside the sphere, or a number is not finite.
+/// Returns the size on the screen of a capture: the diameter of the sphere around its bounds, seen at the center of a
+/// picture, in pixels. `radius` is that of the sphere and `distance` that of its center from the camera, in the same
+/// unit; `focal` is the focal length in pixels. Infinite if the camera is inside the sphere, or a number is not finite.
 pub fn pixels_across(radius: f32, distance: f32, focal: f32) -> f32 {
     let squared = distance * distance - radius * radius;
     let pixels = 2.0 * focal * radius / squared.sqrt();

@@ -8,9 +8,6 @@ use glam::Vec3;
 use rayon::prelude::*;
 use std::f32::consts::{PI, TAU};
 
-/// Radius of the sphere, capture units.
-pub(super) const RADIUS: f32 = 60.0;
-
 /// A lat-long texture of raw, unclamped RGB in the capture's blend space.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Environment {
@@ -24,7 +21,7 @@ pub struct Environment {
 
 impl Environment {
     /// Radius of the sphere that the texture is on, capture units.
-    pub(crate) const RADIUS: f32 = RADIUS;
+    pub(crate) const RADIUS: f32 = 60.0;
 
     /// Returns the color where the ray from `origin` along the unit vector `direction` (capture space) leaves the
     /// sphere. Bilinear, black outside the texture: the seam at the ends of `u` fades, as in the original.
@@ -35,14 +32,14 @@ impl Environment {
         self.weights(origin, direction).map(|(texel, weight)| weight * self.texel(texel)).sum()
     }
 
-    /// Returns the texels, by number in a plane, that [`sample`](Self::sample) combines, and their weights.
+    /// Returns the texels that [`sample`](Self::sample) combines, by index in a plane, and their weights.
     pub(crate) fn weights(&self, origin: Vec3, direction: Vec3) -> impl Iterator<Item = (usize, f32)> {
         let along = origin.dot(direction);
         // Rays from outside may miss the sphere: then the point of the ray nearest to it is used.
-        let reach = -along + (along * along - (origin.length_squared() - RADIUS * RADIUS)).max(0.0).sqrt();
+        let reach = -along + (along * along - (origin.length_squared() - Self::RADIUS.powi(2))).max(0.0).sqrt();
         let hit = origin + direction * reach;
         let u = hit.y.atan2(hit.x) / TAU + 0.5;
-        let v = (hit.z / RADIUS).clamp(-1.0, 1.0).acos() / PI;
+        let v = (hit.z / Self::RADIUS).clamp(-1.0, 1.0).acos() / PI;
         let [width, height] = [self.width, self.height].map(|side| side as f32);
         let across = self.width as usize;
         let (x, y) = (u * width - 0.5, v * height - 0.5);
@@ -62,7 +59,7 @@ impl Environment {
     pub fn check(&self) -> Result<(), &'static str> {
         let texels = self.width.checked_mul(self.height).filter(|&texels| texels > 0);
         if texels.and_then(|texels| (texels as usize).checked_mul(3)) != Some(self.texels.len()) {
-            return Err("its environment map has another number of texels");
+            return Err("its environment map has no texels, or not three values for each");
         }
         if !self.texels.par_iter().all(|value| value.is_finite()) {
             return Err("its environment map has a value that is not finite");

@@ -1,7 +1,7 @@
 //! The temporal filter: the Gaussians that are active in each segment of time.
 //!
-//! In: key-frames at even spacing over the time interval and, for each segment between two of them, a set of Gaussians. Out:
-//! [`TemporalFilter`], stored as bits or as intervals, whichever is smaller; drawing skips inactive Gaussians.
+//! In: key-frames at even spacing over the time interval and, for each segment between two of them, a set of Gaussians.
+//! Out: [`TemporalFilter`], stored as bits or as intervals, whichever is smaller; drawing skips inactive Gaussians.
 
 use crate::gaussian::{Gaussian, lifespan_reach};
 use rayon::prelude::*;
@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "kebab-case")]
 pub enum FilterKind {
     /// The paper's filter: the union of the Gaussians that training cameras see at the two key-frames around a segment.
-    /// Misses Gaussians that are visible only between them.
+    /// Misses Gaussians that are visible only between the key-frames.
     KeyFrame,
     /// The key-frame filter, and every Gaussian that any training view inside the segment blends.
     Interval,
@@ -20,8 +20,8 @@ pub enum FilterKind {
     /// views.
     #[default]
     Support,
-    /// The windows of time in which the capture itself has each Gaussian: frames of a sequence, pieces of a path. Without this filter, or with
-    /// another one, the capture is a different one.
+    /// The windows of time in which each Gaussian exists: frames of a sequence, pieces of a path. The filter is part of
+    /// the capture: without it, or with another filter, the pictures are different.
     Window,
 }
 
@@ -70,7 +70,8 @@ impl TemporalFilter {
 
     /// Creates the support filter: Gaussian `i` is active in a segment if its marginal exceeds the cut-off anywhere in
     /// it. The marginal has one peak, so these segments are one interval. A margin covers rounding: an additional
-    /// active Gaussian changes no pixel. `interval` is the time interval of the capture, `cutoff` its cut-off, `segments` at least 1.
+    /// active Gaussian changes no pixel. `interval` is the time interval of the capture, `cutoff` its cut-off,
+    /// `segments` at least 1.
     pub fn support(gaussians: impl Iterator<Item = Gaussian>, interval: [f32; 2], cutoff: f32, segments: u32) -> Self {
         let reach = lifespan_reach(cutoff);
         let span = f64::from(interval[1]) - f64::from(interval[0]);
@@ -94,7 +95,7 @@ impl TemporalFilter {
         filter
     }
 
-    /// Returns whether it is part of the capture, which no other filter, and no absence of one, may replace.
+    /// Returns whether the filter is part of the capture, so that it may be neither replaced nor removed.
     pub(crate) fn is_of_capture(&self) -> bool {
         self.kind == FilterKind::Window
     }
@@ -128,7 +129,8 @@ impl TemporalFilter {
         count.div_ceil(32)
     }
 
-    /// Returns the times between which Gaussian `index` exists; all times unless the filter is of [windows](FilterKind::Window).
+    /// Returns the times between which Gaussian `index` exists; all times unless the filter is of
+    /// [windows](FilterKind::Window).
     ///
     /// # Panics
     /// If `index` is out of range.
@@ -163,8 +165,8 @@ impl TemporalFilter {
         }
     }
 
-    /// Returns the number of active Gaussians among the Gaussians in the range `own`, for each segment. `own` begins at a
-    /// multiple of 32.
+    /// Returns the number of active Gaussians among the Gaussians in the range `own`, for each segment. `own` begins at
+    /// a multiple of 32.
     ///
     /// # Panics
     /// If `own` is out of range.
@@ -199,7 +201,8 @@ impl TemporalFilter {
 
     /// Returns the fraction of active Gaussians, the mean over all segments; 1 for an empty scene.
     pub fn active_share(&self) -> f64 {
-        // A filter from a file may have so many segments that a test of each Gaussian in each segment would not end.
+        // A filter from a file may have so many segments that testing each Gaussian in each segment would take too
+        // long.
         let active: u64 = self.active_counts(0..self.count).into_iter().map(u64::from).sum();
         let all = self.count * self.segments as usize;
         if all == 0 { 1.0 } else { active as f64 / all as f64 }

@@ -1,6 +1,7 @@
 //! The forms of a scene's Gaussians, each with its color.
 //!
-//! In: a trainer's parameters, sliced Gaussians or packed records. Out: a [`SceneForm`], or a [`Form`] if it is ready to draw.
+//! In: a trainer's parameters, sliced Gaussians or packed records. Out: a [`SceneForm`], or a [`Form`] if it is ready
+//! to draw.
 //!
 //! ```text
 //! SceneForm ─┬─ Trained                               raw parameters, whole harmonics
@@ -111,7 +112,8 @@ impl SceneForm {
         }
     }
 
-    /// Lowers the degrees of its color to at most the degrees given and removes the coefficients that are no longer evaluated.
+    /// Lowers the degrees of its color to at most the degrees given and removes the coefficients that are no longer
+    /// evaluated.
     pub fn truncate_colors(&mut self, degree: u32, degree_t: u32) {
         match self {
             Self::Trained(Trained { harmonics, .. })

@@ -10,8 +10,9 @@ use glam::{Vec3, Vec4};
 
 /// Splits each Gaussian into `times` with the same opacity and color. With `c = times^(-1/3)`, a part has `c` times the
 /// scales, and its 4D mean is `(mean, mean_t) + sqrt(1 - c²) L z`, with `L` the [factor](Parameters::factor) of the
-/// covariance and `z` standard normal: the mixture has the covariance of the Gaussian. The temporal filter
-/// and the levels of detail, which belong to the original Gaussians, are removed. The same seed makes the same scene on every machine.
+/// covariance and `z` standard normal: the mixture has the covariance of the Gaussian. The temporal filter and the
+/// levels of detail, which belong to the original Gaussians, are removed. The same seed makes the same scene on every
+/// machine.
 ///
 /// # Errors
 /// The first Gaussian whose rotation has length zero or is not finite.

@@ -1,21 +1,24 @@
-//! Merging the Gaussians of consecutive frames that are alike.
+//! Merging of alike Gaussians of consecutive frames.
 //!
-//! In: Gaussians at rest, each active in one interval of segments of time, and a tolerance. Out: fewer Gaussians in longer intervals.
+//! In: Gaussians at rest, each active in one interval of segments of time, and a tolerance. Out: fewer Gaussians in
+//! longer intervals.
 //!
-//! The Gaussians that begin in one segment are a frame. A Gaussian continues the one at the same place in the frame before, if it is alike;
-//! otherwise one that is equal in every bit, wherever it is. All members of a chain are compared with its first, which is drawn for all of them.
+//! A frame is the set of Gaussians that begin in one segment. A Gaussian extends the chain at the same place in the
+//! previous frame if both are alike; otherwise a chain at any place that is equal in every bit. All members of a chain
+//! are compared with the first, which is drawn in place of all of them.
 
 use super::filter::{ActiveSets, TemporalFilter};
 use super::sliced::Sliced;
 use crate::gaussian::Gaussian;
 use std::collections::HashMap;
 
-/// The constant factor of the color coefficient of degree 0.
+/// The spherical harmonic of degree 0, the factor on the DC coefficient.
 const FIRST_COEFFICIENT: f32 = 0.282_094_8;
 
-/// Merges Gaussians. Two are alike if their means differ by at most `tolerance` of the root mean square of the scales, their covariances and
-/// opacities by at most this part of themselves, and their colors by at most `tolerance`, of 0 to 1, in each coefficient. Returns `None` if the
-/// filter does not have intervals for these Gaussians.
+/// Merges alike Gaussians. Two Gaussians are alike if their means differ by at most `tolerance` times the root mean
+/// square of the scales, their covariances and opacities by at most the fraction `tolerance`, and each color
+/// coefficient by at most `tolerance` on the scale of colors from 0 to 1. Returns `None` if the filter does not have
+/// intervals for these Gaussians.
 pub fn merge_neighbors(sliced: &Sliced, filter: &TemporalFilter, tolerance: f32) -> Option<(Sliced, TemporalFilter)> {
     let ActiveSets::Intervals(intervals) = &filter.sets else { return None };
     filter.check(sliced.gaussians.len()).ok()?;
@@ -27,7 +30,7 @@ pub fn merge_neighbors(sliced: &Sliced, filter: &TemporalFilter, tolerance: f32)
         }
     }
     let mut chains = Chains { sliced, tolerance, ends: vec![None; intervals.len()] };
-    // The chains that end in each segment, at the places of their last members.
+    // The chains that end in each segment, in the order of their last members.
     let mut ending: Vec<Vec<usize>> = vec![Vec::new(); frames.len()];
     for (segment, frame) in frames.iter().enumerate() {
         let mut before = match segment.checked_sub(1) {
@@ -51,16 +54,18 @@ pub fn merge_neighbors(sliced: &Sliced, filter: &TemporalFilter, tolerance: f32)
     Some((Sliced { gaussians, harmonics }, TemporalFilter { count: kept.len(), sets, ..filter.clone() }))
 }
 
-/// Chains of alike Gaussians, by the index of their first.
+/// Chains of alike Gaussians, by the index of the first member.
 struct Chains<'a> {
     sliced: &'a Sliced,
     tolerance: f32,
-    /// The last segment of the chain that begins with each Gaussian; `None` for its other members and for Gaussians that are never active.
+    /// The last segment of the chain that begins with each Gaussian; `None` for its other members and for Gaussians
+    /// that are never active.
     ends: Vec<Option<u32>>,
 }
 
 impl Chains<'_> {
-    /// Adds a frame. `before` are the chains that end just before it. Returns the chain of each of its Gaussians, and the segment in which it ends.
+    /// Adds a frame. `before` are the chains that end in the previous segment. Returns the chain of each Gaussian of
+    /// the frame, and the segment in which the chain ends.
     fn joined(&mut self, frame: &[usize], before: &mut [usize], intervals: &[u32]) -> Vec<(usize, u32)> {
         let mut taken = vec![false; before.len()];
         let mut chain_of = vec![None; frame.len()];
@@ -89,7 +94,7 @@ impl Chains<'_> {
         joined
     }
 
-    /// Removes a chain that is equal to a Gaussian in every bit.
+    /// Removes a chain whose first member is equal to a Gaussian in every bit, and returns it.
     fn take_equal(&self, by_bits: &mut HashMap<u64, Vec<usize>>, index: usize) -> Option<usize> {
         let candidates = by_bits.get_mut(&self.hash(index))?;
         let at = candidates.iter().position(|&chain| self.are_equal(chain, index))?;
@@ -181,7 +186,7 @@ mod tests {
         let frames: [&[(f32, f32)]; 4] =
             [&[(1.0, 0.1), (2.0, 0.2)], &[(1.0, 0.1), (2.5, 0.2)], &[(1.0, 0.1), (2.0, 0.2)], &[(3.0, 0.1)]];
         let expected = [(1.0, 0, 2), (2.0, 0, 0), (2.5, 1, 1), (2.0, 2, 2), (3.0, 3, 3)];
-        assert_eq!(merged(&frames, 0.0), expected, "only consecutive frames, only equal ones");
+        assert_eq!(merged(&frames, 0.0), expected, "only equal Gaussians of consecutive frames are merged");
     }
 
     #[test]
@@ -193,8 +198,11 @@ mod tests {
         found.sort_by(|a, b| (a.1, a.0).partial_cmp(&(b.1, b.0)).expect("numbers"));
         let mut sorted = expected.to_vec();
         sorted.sort_by(|a, b| (a.1, a.0).partial_cmp(&(b.1, b.0)).expect("numbers"));
-        assert_eq!(found.len(), sorted.len(), "{found:?}");
-        assert!(found.contains(&(1.0, 0, 1)) && found.contains(&(2.0, 0, 2)), "each continues one alone: {found:?}");
+        assert_eq!(found.len(), sorted.len(), "the number of merged Gaussians: {found:?}");
+        assert!(
+            found.contains(&(1.0, 0, 1)) && found.contains(&(2.0, 0, 2)),
+            "each Gaussian extends one chain only: {found:?}"
+        );
     }
 
     #[test]
@@ -203,8 +211,8 @@ mod tests {
         let frames: Vec<Vec<(f32, f32)>> = (0..6).map(|frame| vec![(frame as f32 * 0.004, 0.0)]).collect();
         let frames: Vec<&[(f32, f32)]> = frames.iter().map(Vec::as_slice).collect();
         let intervals: Vec<(u32, u32)> = merged(&frames, 0.1).iter().map(|&(_, first, last)| (first, last)).collect();
-        assert_eq!(intervals, [(0, 2), (3, 5)], "three steps are farther than a tenth of the scale");
-        assert_eq!(merged(&frames, 0.0).len(), 6, "no two are equal");
+        assert_eq!(intervals, [(0, 2), (3, 5)], "three steps are more than a tenth of the scale");
+        assert_eq!(merged(&frames, 0.0).len(), 6, "no two Gaussians are equal");
         let colors: [&[(f32, f32)]; 2] = [&[(1.0, 0.0)], &[(1.0, 0.5)]];
         assert_eq!((merged(&colors, 0.1).len(), merged(&colors, 0.2).len()), (2, 1), "a difference of 0.14 in red");
     }
@@ -225,7 +233,7 @@ mod tests {
             let mut expected: Vec<f32> = own.iter().map(|(x, _)| *x).collect();
             drawn.sort_by(f32::total_cmp);
             expected.sort_by(f32::total_cmp);
-            assert_eq!(drawn, expected, "frame {frame}");
+            assert_eq!(drawn, expected, "the Gaussians drawn in frame {frame}");
         }
     }
 }

@@ -1,10 +1,10 @@
 //! Picking: the Gaussian that a ray hits.
 //!
-//! In: a ray in capture space, and [`PickSettings`] with the time and the Gaussians that can be hit. Out: a [`Pick`]; `None` if the ray
-//! hits nothing.
+//! In: a ray in capture space, and [`PickSettings`] with the time and the Gaussians that can be hit. Out: a [`Pick`];
+//! `None` if the ray hits nothing.
 //!
-//! Along a ray every Gaussian is a Gaussian of one dimension. With the conditional mean `m` and covariance `Σ` at time `t`, the
-//! ray's origin `o`, its unit direction `w` and two unit vectors `u`, `v` across it:
+//! Along a ray every Gaussian is a Gaussian of one dimension. With the conditional mean `m` and covariance `Σ` at time
+//! `t`, the ray's origin `o`, its unit direction `w` and two unit vectors `u`, `v` across it:
 //!
 //! ```text
 //! q     = [u v]ᵀ (m − o)                     offset of the mean across the ray
@@ -14,16 +14,16 @@
 //! alpha = min(0.99, opacity · marginal(t) · exp(−½ D²))
 //! ```
 //!
-//! This is what `blend` computes for a pixel, without the perspective within a splat and the low-pass of the screen. As
-//! there, a Gaussian whose marginal is not above the cut-off, or an alpha below 1/255, is skipped. Front to back by depth, the
-//! transmittance is multiplied by `1 − alpha`; the Gaussian at which it falls to `1 − threshold` or below is hit. With
-//! a threshold of one half, this is the Gaussian whose depth is the median depth.
+//! The values are those of `blend` at a pixel, without the perspective within a splat and the low-pass on the screen.
+//! As in `blend`, a Gaussian whose marginal is not above the cut-off, or an alpha below 1/255, is skipped. Front to
+//! back by depth, the transmittance is multiplied by `1 − alpha`; the Gaussian at which it falls to `1 − threshold` or
+//! below is hit. With a threshold of one half, this is the Gaussian whose depth is the median depth.
 //!
-//! `S` is the projection of `Σ` and does not need its inverse, so that flat Gaussians, whose `Σ` has none, are no
-//! special case. `S` has no inverse only for a disk seen exactly edge-on or a needle seen exactly end-on. Therefore
-//! `ε = 2⁻²² tr Σ` is added, which is as small as possible: the rounding of covariances to `f32` can make a variance of
-//! 0 appear as −¾ of that. It makes a disk about 1/2000 as thick as it is wide. A Gaussian without any extent is never
-//! hit.
+//! `S` is the projection of `Σ` and does not need its inverse, so that flat Gaussians, whose `Σ` has no inverse, are
+//! not a special case. `S` has no inverse only for a disk seen exactly edge-on or a needle seen exactly end-on.
+//! Therefore `ε = 2⁻²² tr Σ` is added, which is as small as possible: the rounding of covariances to `f32` can turn a
+//! variance of 0 into −¾ ε. With ε a disk is about 1/2000 as thick as it is wide. A Gaussian without any extent is
+//! never hit.
 
 use super::{RuntimeScene, TemporalFilter};
 use crate::gaussian::Gaussian;
@@ -70,8 +70,8 @@ pub struct Pick {
 }
 
 impl RuntimeScene {
-    /// Returns the Gaussian that the ray from `origin` along `direction` (of any length), both in capture space, hits. The
-    /// formula is in `scene::pick`.
+    /// Returns the Gaussian that the ray from `origin` along `direction` (of any length), both in capture space, hits.
+    /// The formula is in `scene::pick`.
     ///
     /// `None` if the ray hits nothing, and for an invalid ray: a direction of length zero, or numbers that are not
     /// finite. A Gaussian whose densest point on the ray lies behind the origin is not hit.
@@ -129,8 +129,8 @@ impl Ray {
         Some(Self { origin, along, across: [u, v], length })
     }
 
-    /// Returns the depth and alpha of a Gaussian on the ray; `None` if it is not visible there, as where its marginal is not above `cutoff`.
-    /// The comparisons treat NaN as not visible.
+    /// Returns the depth and alpha of a Gaussian on the ray; `None` if it is not visible there, for example because its
+    /// marginal is not above `cutoff`. The comparisons treat NaN as not visible.
     fn cross(&self, gaussian: &Gaussian, cutoff: f32, settings: &PickSettings) -> Option<Crossing> {
         let marginal = gaussian.marginal(settings.time);
         let mean = gaussian.mean_at(settings.time);

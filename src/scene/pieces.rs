@@ -1,10 +1,12 @@
 //! Curved paths of Gaussians, split into straight pieces.
 //!
-//! In: the path, the lifespan and the scale of each Gaussian, a time interval and a tolerance. Out: [`Pieces`]: Gaussians in straight-line
-//! motion, each active in segments of time of its own, so that exactly one piece of a path is active at every time at which it is visible.
+//! In: the path, the lifespan and the scale of each Gaussian, a time interval and a tolerance. Out: [`Pieces`]:
+//! Gaussians in straight-line motion, each active in segments of time of its own, so that exactly one piece of a path
+//! is active at every time at which it is visible.
 //!
-//! A piece has the lifespan of its path: its opacity changes as before, and its mean lies on the chord of the path between its first and its
-//! last time. Neighbors meet at a boundary between two segments of the temporal filter, where both are on the path.
+//! A piece has the lifespan of its path: its opacity changes as before, and its mean lies on the chord of the path
+//! between its first and its last time. Neighbors meet at a boundary between two segments of the temporal filter, where
+//! both are on the path.
 
 use super::filter::{ActiveSets, FilterKind, TemporalFilter};
 use glam::DVec3;
@@ -17,13 +19,13 @@ pub(crate) const MOST_OF_ONE: u32 = 256;
 /// Largest number of pieces of all paths, about 2 GiB of sliced Gaussians of color degree 0.
 pub(crate) const MOST: usize = 1 << 24;
 
-/// Points of a smooth path that are compared with its chord, both ends excluded. The largest distance of a cubic path is at most 2 %
-/// larger than at these points.
+/// Points of a smooth path that are compared with its chord, both ends excluded. The largest distance of a cubic path
+/// is at most 2 % larger than at these points.
 const SAMPLES: u32 = 16;
 const SAMPLED: f64 = 0.98;
-/// Paths that are tried together.
+/// Number of paths that one parallel task splits.
 const CHUNK: usize = 1024;
-/// Factor of the tolerance when there are too many pieces: half as many are needed with it.
+/// Factor on the tolerance if there are too many pieces. It halves their number.
 const COARSER: f64 = 4.0;
 
 /// The path of a Gaussian and its lifespan.
@@ -35,7 +37,7 @@ pub(crate) struct Curve<P> {
     pub mean_t: f32,
     /// Temporal standard deviation, timestamp units; infinite if the Gaussian is present at every time.
     pub sigma_t: f32,
-    /// The times between which it exists, rounded to segments; all of them if they are infinite.
+    /// The times between which the Gaussian exists, rounded to segments; infinite: at every time.
     pub window: [f32; 2],
     /// The scale that the tolerance is relative to, the middle one of the three; capture units.
     pub scale: f32,
@@ -101,12 +103,12 @@ pub(crate) struct Pieces {
     pub error: f64,
     /// Largest such distance relative to the scale of the Gaussian.
     pub relative_error: f64,
-    /// Number of paths that are farther from their pieces than the tolerance given: they need shorter pieces than [`MOST_OF_ONE`] or the
-    /// segments of the filter allow.
+    /// Number of paths that are farther from their pieces than the given tolerance: they need shorter pieces than
+    /// [`MOST_OF_ONE`] or the segments of the filter allow.
     pub coarse: usize,
     /// Number of paths that are never visible within the interval and have no piece.
     pub unseen: usize,
-    /// The tolerance with which the pieces are at most [`MOST`]: that given, or a larger one.
+    /// The tolerance that was used: the given one, or a larger one that limits the pieces to [`MOST`].
     pub tolerance: f32,
 }
 
@@ -187,7 +189,7 @@ impl Splitting {
         let segments = f64::from(self.segments);
         let position = |time: f64| (time - begin) / span * segments;
         let [opens, closes] = curve.window.map(|time| position(f64::from(time)).round().clamp(0.0, segments));
-        // A window of numbers that are not finite has no segment.
+        // A window with a NaN has no segment.
         if opens.partial_cmp(&closes).is_none_or(|order| order.is_ge()) {
             return None;
         }
@@ -269,7 +271,8 @@ struct Found {
     unseen: usize,
 }
 
-/// Returns the largest length in a range that fits, to within 1/64 of it; the smallest if none fits. Tries `guess` first.
+/// Returns the largest length in a range that fits, to within 1/64 of it; the smallest if none fits. Tries `guess`
+/// first.
 fn longest(range: RangeInclusive<u32>, guess: u32, fits: impl Fn(u32) -> bool) -> u32 {
     let (mut fitting, most) = range.into_inner();
     let mut length = guess.clamp(fitting, most);
@@ -373,7 +376,7 @@ mod tests {
             let splitting = Splitting { bends: Bends::AtSegments, ..splitting(40, 1e-6) };
             let pieces = splitting.split(1, |_| Curve { position, mean_t: 0.0, sigma_t: f32::INFINITY, window: ALWAYS, scale: 1.0 });
             prop_assert!(pieces.pieces.len() <= bends.len() + 1, "a straight line is one piece");
-            prop_assert!(pieces.relative_error <= 1e-6 && pieces.coarse == 0, "key-frames are met");
+            prop_assert!(pieces.relative_error <= 1e-6 && pieces.coarse == 0, "the pieces pass through the key-frames");
         }
     }
 
@@ -392,9 +395,9 @@ mod tests {
         };
         let pieces = splitting(MAX_SEGMENTS, 0.25).split(3000, curve);
         let sources: Vec<u32> = pieces.pieces.iter().map(|piece| piece.source).collect();
-        assert!(sources.is_sorted() && sources.last() == Some(&2999), "ascending");
+        assert!(sources.is_sorted() && sources.last() == Some(&2999), "pieces are in the order of their paths");
         assert_eq!(sources.iter().filter(|&&source| source == 0).count(), 1, "a Gaussian at rest is one piece");
-        assert!(pieces.coarse > 0, "fast ones need more pieces than are allowed");
+        assert!(pieces.coarse > 0, "fast paths need more pieces than are allowed");
     }
 
     #[test]
@@ -403,9 +406,9 @@ mod tests {
         let splitting = splitting(MAX_SEGMENTS, 0.25);
         let free = splitting.split_into(100, curve, usize::MAX);
         let limited = splitting.split_into(100, curve, free.pieces.len() - 1);
-        assert!(limited.pieces.len() < free.pieces.len(), "fewer pieces");
-        assert_eq!((free.tolerance, limited.tolerance), (0.25, 1.0), "a larger tolerance, which is told");
-        assert_eq!((free.coarse, limited.coarse), (0, 100), "the number of paths beyond the tolerance given is told");
+        assert!(limited.pieces.len() < free.pieces.len(), "a limit leaves fewer pieces");
+        assert_eq!((free.tolerance, limited.tolerance), (0.25, 1.0), "the raised tolerance is returned");
+        assert_eq!((free.coarse, limited.coarse), (0, 100), "paths beyond the given tolerance are counted");
         assert_eq!(splitting.split_into(100, curve, 3).pieces.len(), 100, "each path keeps one piece");
     }
 
@@ -413,7 +416,7 @@ mod tests {
     fn a_path_outside_the_interval_has_no_piece() {
         let curve = |_| Curve { position: circle, mean_t: 9.0, sigma_t: 0.1, window: ALWAYS, scale: 0.01 };
         let pieces = splitting(100, 0.25).split(5, curve);
-        assert_eq!((pieces.pieces.len(), pieces.unseen), (0, 5), "nothing to draw");
+        assert_eq!((pieces.pieces.len(), pieces.unseen), (0, 5), "every path is unseen");
     }
 
     #[test]
@@ -429,7 +432,7 @@ mod tests {
         assert_eq!(
             ends,
             [(7, 9), (10, 19), (35, 39)],
-            "segments of a tenth of a unit, the first also within its lifespan"
+            "windows in segments of a tenth of a unit; the lifespan also limits the first path"
         );
         assert_eq!(pieces.unseen, 2, "windows outside the interval, or shorter than half a segment");
     }
@@ -439,6 +442,6 @@ mod tests {
         let curve =
             |_| Curve { position: |_| DVec3::NAN, mean_t: 1.0, sigma_t: f32::INFINITY, window: ALWAYS, scale: 0.0 };
         let pieces = splitting(MAX_SEGMENTS, 0.25).split(1, curve);
-        assert!(pieces.pieces.len() <= MOST_OF_ONE as usize, "bounded");
+        assert!(pieces.pieces.len() <= MOST_OF_ONE as usize, "the number of pieces is bounded");
     }
 }

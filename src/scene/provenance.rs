@@ -1,7 +1,7 @@
 //! The settings with which a capture was trained and is meant to be played.
 //!
-//! In: options of a command, `cfg_args`, or a package's header. Out: [`TrainedWith`] and [`PlaybackHints`], stored in every
-//! package so that drawing needs no options.
+//! In: options of a command, `cfg_args`, or a package's header. Out: [`TrainedWith`] and [`PlaybackHints`], stored in
+//! every package so that drawing needs no options.
 
 use crate::gaussian::{MARGINAL_CUTOFF, ShDirection};
 use crate::view::{NEAR, Optics, RasterFov};
@@ -23,7 +23,7 @@ pub struct TrainedWith {
     pub cameras: TrainedCameras,
     /// Mean that gives the viewing direction of color. Default: canonical.
     pub sh_direction: ShDirection,
-    /// Whether only the first 16 coefficients are evaluated, whatever is stored. Default: `false`.
+    /// Whether only the first 16 coefficients are evaluated, even if more are stored. Default: `false`.
     pub force_sh_3d: bool,
     /// Added to the temporal variance in the marginal, if positive. Default: −1, nothing is added.
     pub prefilter_var: f32,
@@ -34,22 +34,24 @@ pub struct TrainedWith {
     pub iteration: u64,
     /// Extent of the training cameras, the factor of positional learning rates. Default: 1.
     pub spatial_lr_scale: f64,
-    /// Near limit of the cameras, capture units: a Gaussian is not drawn unless its depth is larger. Default: 0.2, that of the original.
+    /// Near plane of the cameras, capture units: a Gaussian is not drawn unless its depth is larger. Default: 0.2, that
+    /// of the original.
     #[serde(skip_serializing_if = "is_the_original_near")]
     pub near: f32,
-    /// Whether it was trained with the screen-space filter of Mip-Splatting: the opacity of each splat is reduced by what its enlargement by 0.3
-    /// pixels squared adds to its area. Default: `false`.
+    /// Whether it was trained with the screen-space filter of Mip-Splatting: the opacity of each splat is reduced to
+    /// compensate for the low-pass of 0.3 pixels squared, which makes it larger. Default: `false`.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub mip_filter: bool,
-    /// Where the capture's space and its times begin in the coordinates of the files that it was made from. Default: zeros, the same coordinates.
+    /// Where the capture's space and its times begin in the coordinates of the files that it was made from. Default:
+    /// zeros, the same coordinates.
     #[serde(skip_serializing_if = "Origin::is_zero")]
     pub origin: Origin,
-    /// Largest size of a pixel of the training views at the Gaussians that they see, capture units. Views of larger pixels may be
-    /// anti-aliased ([`View::antialiased`](crate::view::View::antialiased)). Default: `None`, not known.
+    /// Largest size of a pixel of the training views at the Gaussians that they see, capture units. Views of larger
+    /// pixels may be anti-aliased ([`View::antialiased`](crate::view::View::antialiased)). Default: `None`, not known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pixel: Option<f32>,
-    /// How the views of the dataset were divided when the capture was fine-tuned or baked, for people: how many were trained on, and on which
-    /// the choices were made. Default: `None`, not known.
+    /// Text that describes how the views of the dataset were divided when the capture was fine-tuned or baked: how many
+    /// were used for training, and which for choices. Default: `None`, not known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub validation: Option<String>,
 }
@@ -88,14 +90,14 @@ impl Default for TrainedWith {
 }
 
 impl TrainedWith {
-    /// Returns how its cameras draw the capture.
+    /// Returns the optics with which the training cameras drew the capture.
     pub fn optics(&self) -> Optics {
         let trained_pixel = if self.mip_filter { 0.0 } else { f32::INFINITY };
         Optics { raster_fov: self.raster_fov, near: self.near, trained_pixel }
     }
 
-    /// Returns the length that the lengths of training settings are multiples of, capture units: 1, or less in a scene that is so small that its
-    /// near limit is less than that of the original.
+    /// Returns the unit of the lengths among the training settings, capture units: 1, or less in a scene so small that
+    /// its near plane is nearer than that of the original.
     pub(crate) fn unit_length(&self) -> f64 {
         f64::from(self.near) / f64::from(NEAR)
     }
@@ -111,9 +113,9 @@ impl TrainedWith {
     }
 }
 
-/// The origin of a capture in the coordinates of the files that it was made from, where these are so far from 0 that single precision would lose
-/// digits: maps (UTM) and times since 1970. A place of the files is `place` + a mean, a time of the files is `time` + a timestamp; both in the unit
-/// of the files, which is that of the capture. Default: zeros.
+/// The origin of a capture in the coordinates of the files that it was made from, if these coordinates are too far from
+/// 0 for single precision: maps (UTM) and times since 1970. A place of the files is `place` + a mean, a time of the
+/// files is `time` + a timestamp; both in the unit of the files, which is that of the capture. Default: zeros.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Origin {
@@ -158,8 +160,8 @@ pub enum TrainedCameras {
 pub struct PlaybackHints {
     /// The axis that points up in the capture's own space. Default: +Z.
     pub up: UpAxis,
-    /// Seconds that one pass through the time interval takes at speed 1; 0 for a still, which shows the first timestamp.
-    /// Default: 1.
+    /// Seconds that one pass through the time interval takes at speed 1; 0 for a still, which shows the first
+    /// timestamp. Default: 1.
     pub duration_seconds: f32,
 }
 
@@ -198,6 +200,18 @@ impl UpAxis {
             Self::NegY => glam::Vec3::NEG_Y,
             Self::PosZ => glam::Vec3::Z,
             Self::NegZ => glam::Vec3::NEG_Z,
+        }
+    }
+
+    /// Returns the name of the axis: `+z`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::PosX => "+x",
+            Self::NegX => "-x",
+            Self::PosY => "+y",
+            Self::NegY => "-y",
+            Self::PosZ => "+z",
+            Self::NegZ => "-z",
         }
     }
 }

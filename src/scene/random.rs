@@ -8,7 +8,7 @@ use std::f32::consts::TAU;
 pub(crate) struct Random(u64);
 
 impl Random {
-    /// Returns the numbers of a seed.
+    /// Creates the generator of a seed.
     pub(crate) fn new(seed: u64) -> Self {
         Self(seed)
     }

@@ -34,8 +34,7 @@ pub struct RuntimeScene {
 /// A level of detail: a capture of fewer Gaussians, without levels, environment map and temporal filter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Level {
-    /// The largest size on the screen (`pixels_across`) at which it looks nearly the same as all
-    /// Gaussians, pixels.
+    /// The largest size on the screen (`pixels_across`) at which it looks nearly the same as all Gaussians, pixels.
     pub pixels: f32,
     /// Its Gaussians and their color. The time interval is that of the capture. Shared, because it does not change.
     pub scene: Arc<RuntimeScene>,
@@ -88,8 +87,8 @@ impl RuntimeScene {
     }
 
     /// Checks that its parts fit together, as those of every loaded scene do: lengths, codes, the temporal filter, the
-    /// levels of detail, and that the environment map is finite. No index of a checked scene is out of range, here or on
-    /// a GPU.
+    /// levels of detail, and that the environment map is finite. No index of a checked scene is out of range, here or
+    /// on a GPU.
     ///
     /// # Errors
     /// A description of the first part that does not fit.
@@ -107,9 +106,10 @@ impl RuntimeScene {
         }
     }
 
-    /// Returns the size of training pixels, in capture units, with which a level of detail is anti-aliased (0: all Gaussians, also if there
-    /// is no such level); `None`: it is drawn without anti-aliasing. Levels are always anti-aliased, by their own size, because they were
-    /// trained with anti-aliasing. All Gaussians are anti-aliased if `antialias` is true.
+    /// Returns the training pixel size, in capture units, with which a level of detail is anti-aliased (level 0, or one
+    /// that does not exist: all Gaussians); `None`: it is drawn without anti-aliasing. Levels are always anti-aliased,
+    /// by their own pixel size, because they were trained with anti-aliasing. All Gaussians are anti-aliased if
+    /// `antialias` is true.
     pub fn antialias_pixel(&self, level: usize, antialias: bool) -> Option<f32> {
         match level.checked_sub(1).and_then(|index| self.levels.get(index)) {
             Some(level) => level.scene.trained_with.pixel,
@@ -117,8 +117,8 @@ impl RuntimeScene {
         }
     }
 
-    /// Returns how a level of detail is drawn (0: all Gaussians, also if there is no such level), with the [`antialias_pixel`](Self::antialias_pixel)
-    /// of the same arguments.
+    /// Returns how a level of detail is drawn, with the [`antialias_pixel`](Self::antialias_pixel) of the same
+    /// arguments.
     pub fn optics(&self, level: usize, antialias: bool) -> Optics {
         let drawn = level.checked_sub(1).and_then(|index| self.levels.get(index));
         let own = drawn.map_or(&self.trained_with, |level| &level.scene.trained_with).optics();
@@ -197,20 +197,20 @@ mod tests {
     }
 
     #[test]
-    fn levels_have_the_near_limit_of_the_capture_and_their_own_filter() {
+    fn levels_have_the_near_plane_of_the_capture_and_their_own_mip_filter() {
         let trained = |pixel, near, mip_filter| TrainedWith { pixel, near, mip_filter, ..TrainedWith::default() };
         let coarse = RuntimeScene { trained_with: trained(Some(0.5), 0.2, false), ..empty() };
         let scene =
             RuntimeScene { trained_with: trained(Some(0.25), 0.01, true), levels: vec![level(8.0, coarse)], ..empty() };
         for antialias in [false, true] {
             let [all, first] = [0, 1].map(|level| scene.optics(level, antialias));
-            assert_eq!([all.near, first.near], [0.01; 2], "the near limit of the capture");
-            assert_eq!(all.trained_pixel, 0.0, "anti-aliasing does not undo the filter of the capture");
-            assert_eq!(first.trained_pixel, 0.5, "the level was not trained with the filter");
+            assert_eq!([all.near, first.near], [0.01; 2], "the near plane of the capture");
+            assert_eq!(all.trained_pixel, 0.0, "anti-aliasing does not undo the mip filter of the capture");
+            assert_eq!(first.trained_pixel, 0.5, "the level was not trained with the mip filter");
         }
         let plain = RuntimeScene { trained_with: trained(Some(0.25), 0.2, false), ..empty() };
         let pixels = [false, true].map(|antialias| plain.optics(0, antialias).trained_pixel);
-        assert_eq!(pixels, [f32::INFINITY, 0.25], "without a filter only anti-aliasing reduces opacity");
+        assert_eq!(pixels, [f32::INFINITY, 0.25], "without a mip filter only anti-aliasing reduces opacity");
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! A procedural moving scene of any size, for tests and benchmarks.
 //!
-//! In: a count and a seed. Out: a [`GaussianScene`] in the trained form, the same on every machine: a checkered ground at rest
-//! and colored balls circling over it, with lifespans from a flash to the whole interval.
+//! In: a count and a seed. Out: a [`GaussianScene`] in the trained form, the same on every machine: a checkered ground
+//! at rest and colored balls circling over it, with lifespans from a flash to the whole interval.
 
 use super::random::Random;
 use super::{GaussianScene, PlaybackHints, SceneForm, Trained, TrainedWith};
@@ -96,8 +96,8 @@ fn ball_point(ball: usize, random: &mut Random) -> (Vec3, Vec3, Motion) {
     (motion(0.0), color, Box::new(motion))
 }
 
-/// Returns a pair of quaternions: equal quaternions give a Gaussian at rest, different ones a Gaussian that moves. Their
-/// components are reversed so that the 3D part is the rotation `turn`.
+/// Returns a pair of quaternions: equal quaternions give a Gaussian at rest, different ones a Gaussian that moves.
+/// Their components are reversed so that the 3D part is the rotation `turn`.
 fn rotations(ground: bool, random: &mut Random) -> ([f32; 4], [f32; 4]) {
     let [a, b, c] = if ground {
         [random.in_range(0.0, TAU), 0.0, 0.0]

@@ -17,7 +17,7 @@ use glam::{Affine3A, Vec3};
 ///
 /// let (trained, appearance) = (Vec3::splat(0.5), Appearance::default());
 /// assert_eq!(appearance.color(trained, BlendSpace::Encoded), trained, "blended as trained");
-/// assert!(appearance.color(trained, BlendSpace::Linear).x < 0.25, "half of the encoded range is a fifth of the light");
+/// assert!(appearance.color(trained, BlendSpace::Linear).x < 0.25, "half of the encoded range is 21 % of the light");
 /// ```
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum BlendSpace {
@@ -38,7 +38,8 @@ pub enum DebugView {
     Depth,
     /// Number of splats blended at each pixel, from black (0) through blue, green and yellow to red (64 or more).
     Overdraw,
-    /// Every Gaussian that is active in the temporal filter's current segment: green if it is visible at this time, else red.
+    /// Every Gaussian that is active in the temporal filter's current segment: green if it is visible at this time,
+    /// else red.
     Active,
     /// The standard deviation in time `σ_t`: blue for an instant, red for the whole duration.
     Lifespan,

@@ -26,7 +26,8 @@ pub enum Lens {
         /// `tan(FovX / 2)`, `tan(FovY / 2)`.
         tan: Vec2,
     },
-    /// An *intrinsics camera*: focal lengths and principal point in pixels (pixel centers at half-integers, as in COLMAP).
+    /// An *intrinsics camera*: focal lengths and principal point in pixels (pixel centers at half-integers, as in
+    /// COLMAP).
     Intrinsics {
         /// `fl_x`, `fl_y` in pixels.
         focal: Vec2,
@@ -52,8 +53,8 @@ impl Camera {
         Self { world_to_camera, size, lens: Self::fov_lens(f64::from(fov_x), size) }
     }
 
-    /// Returns the view of this camera at `time`, in the capture's unit. `optics` are those of the capture, or a [`RasterFov`] alone with the
-    /// near limit of the original.
+    /// Returns the view of this camera at `time`, in the capture's unit. `optics` are those of the capture, or a
+    /// [`RasterFov`] alone with the near plane of the original.
     pub fn view(&self, time: f32, optics: impl Into<Optics>) -> View {
         let optics = optics.into();
         let size = self.size.as_vec2();

@@ -1,8 +1,9 @@
-//! How a capture is drawn by any camera: what depends on its training and not on the camera.
+//! The part of drawing that depends on the training of a capture and not on the camera.
 //!
-//! In: the settings that a capture was trained with. Out: [`Optics`], from which [`Camera::view`](super::Camera::view) makes a view.
+//! In: the settings that a capture was trained with. Out: [`Optics`], from which [`Camera::view`](super::Camera::view)
+//! makes a view.
 
-/// Near limit of the original, capture units: a Gaussian is not drawn unless its depth is larger.
+/// Near plane of the original, capture units: a Gaussian is not drawn unless its depth is larger.
 pub const NEAR: f32 = 0.2;
 
 /// The field of view that shapes the footprints of splats seen by an intrinsics camera. Default:
@@ -23,10 +24,11 @@ pub enum RasterFov {
 pub struct Optics {
     /// Which field of view shapes the footprints of splats. Default: [`RasterFov::Reference`].
     pub raster_fov: RasterFov,
-    /// Near limit, capture units: a Gaussian is not drawn unless its depth is larger. Default: [`NEAR`].
+    /// Near plane, capture units: a Gaussian is not drawn unless its depth is larger. Default: [`NEAR`].
     pub near: f32,
-    /// Size of a pixel of the training views where they see the capture, capture units; as [`View::trained_pixel`](super::View::trained_pixel).
-    /// 0: the opacity of every splat is reduced, as by the filter of Mip-Splatting. Default: infinite, no reduction.
+    /// Size of a pixel of the training views where they see the capture, capture units; as
+    /// [`View::trained_pixel`](super::View::trained_pixel). 0: the opacity of every splat is reduced, as by the filter
+    /// of Mip-Splatting. Default: infinite, no reduction.
     pub trained_pixel: f32,
 }
 
@@ -37,7 +39,7 @@ impl Default for Optics {
 }
 
 impl From<RasterFov> for Optics {
-    /// Returns the near limit of the original, without reduction of opacity.
+    /// Returns the optics with the near plane of the original, without reduction of opacity.
     fn from(raster_fov: RasterFov) -> Self {
         Self { raster_fov, near: NEAR, trained_pixel: f32::INFINITY }
     }

@@ -18,7 +18,8 @@ pub struct View {
     pub size: UVec2,
     /// Timestamp, in the capture's unit.
     pub time: f32,
-    /// Capture space (the capture's own world) to camera space (OpenCV axes); may scale and shear when a model transform is included.
+    /// Capture space (the capture's own world) to camera space (OpenCV axes); may scale and shear when a model
+    /// transform is included.
     pub world_to_camera: Mat4,
     /// Rows x and y of the projection: `P00, P11, P02, P12` in `ndc = (P00 x + P02 z, P11 y + P12 z) / z`. For an
     /// orthographic camera: `P00, P11, P03, P13` in `ndc = (P00 x + P03, P11 y + P13)`.
@@ -30,16 +31,18 @@ pub struct View {
     pub camera_position: Vec3,
     /// Tangents of half the field of view that shapes footprints (negative for the sentinel).
     pub tan_fov: Vec2,
-    /// Near limit in camera units: that of the capture ([`Optics::near`]), scaled as the capture is; for an orthographic camera, its near plane.
+    /// Near plane in camera units: that of the capture ([`Optics::near`]), scaled as the capture is; for an
+    /// orthographic camera, its own.
     pub near: f32,
-    /// Size of a pixel of the training views where they see the capture, capture units. The opacity of
-    /// splats that larger pixels blur is reduced accordingly. Infinite: no reduction, as in the original. 0: the reduction of Mip-Splatting.
+    /// Size of a pixel of the training views where they see the capture, capture units. The opacity of splats that
+    /// larger pixels blur is reduced accordingly. Infinite: no reduction, as in the original. 0: the reduction of
+    /// Mip-Splatting.
     pub trained_pixel: f32,
 }
 
 impl View {
-    /// Creates a view from its parts, with the near limit of the original; `world_to_camera` may include a model transform (rotation,
-    /// translation, any scale).
+    /// Creates a view from its parts, with the near plane of the original; `world_to_camera` may include a model
+    /// transform (rotation, translation, any scale).
     pub fn new(size: UVec2, time: f32, world_to_camera: Mat4, projection: Vec4, tan_fov: Vec2) -> Self {
         let inverse = world_to_camera.as_dmat4().inverse();
         Self {
@@ -71,20 +74,21 @@ impl View {
         }
     }
 
-    /// Returns the view with the near limit and the training pixel of a capture. An orthographic view keeps its near plane.
+    /// Returns the view with the near plane and the training pixel of a capture. An orthographic view keeps its own
+    /// near plane.
     pub fn with_optics(self, optics: Optics) -> Self {
         let near = if self.orthographic { self.near } else { near_in_camera(optics.near, &self.world_to_camera) };
         Self { near, trained_pixel: optics.trained_pixel, ..self }
     }
 
-    /// Returns the view with anti-aliasing, given the size of a pixel of the training views (`None`, not known: without further
-    /// anti-aliasing). Of two sizes the smaller one counts, so that the filter of a capture stays.
+    /// Returns the view with anti-aliasing, given the size of a pixel of the training views (`None`, not known: without
+    /// further anti-aliasing). The smaller of both sizes is used, so that the mip filter of a capture remains.
     pub fn antialiased(self, trained_pixel: Option<f32>) -> Self {
         Self { trained_pixel: trained_pixel.map_or(self.trained_pixel, |pixel| self.trained_pixel.min(pixel)), ..self }
     }
 
-    /// Returns the variances across and down the screen of a variance of one training pixel squared, at a scale of one pixel per
-    /// camera unit; at most 1e20, which stands for infinity.
+    /// Returns the variances across and down the screen of a variance of one training pixel squared, at a scale of one
+    /// pixel per camera unit; at most 1e20, which stands for infinity.
     pub fn trained_variance(&self) -> Vec2 {
         let along = |row| {
             let pixel = self.trained_pixel * self.world_to_camera.row(row).truncate().length();
@@ -147,7 +151,7 @@ impl View {
     }
 }
 
-/// Converts a near limit from capture units to camera units.
+/// Converts a near plane from capture units to camera units.
 fn near_in_camera(near: f32, world_to_camera: &Mat4) -> f32 {
     // Depth grows by |row z| camera units for each capture unit along the viewing direction.
     near * world_to_camera.row(2).truncate().length()

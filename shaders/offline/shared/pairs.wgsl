@@ -1,5 +1,5 @@
-// The sorted pairs of a finished frame, for passes that write results for each pair: `score` and `blend_backward`. The results are in the
-// order in which `bin` emitted the pairs: the pairs of one splat are contiguous.
+// The sorted pairs of a finished frame, for passes that write results for each pair: `score` and `blend_backward`. The
+// results are in the order in which `bin` emitted the pairs: the pairs of one splat are contiguous.
 #define_import_path gs4d::pairs
 
 #import gs4d::tile::pair_of_tile

@@ -1,4 +1,4 @@
-// Random words by hashing; CPU reference: src/offline/fine_tune/random_words.rs.
+// Random words by hashing; CPU reference: src/offline/train/reference/random_words.rs.
 #define_import_path gs4d::random
 
 // Returns a word of which each bit depends on every bit of the argument.

@@ -1,5 +1,5 @@
-// Converts the gradients of a sliced Gaussian to the gradients of its raw scales and rotations, for the training passes. CPU reference:
-// `through_sigma` of src/gaussian/gradient.rs; equations: section 7.4 of the 4DGS model.
+// Converts the gradients of a sliced Gaussian to the gradients of its raw scales and rotations, for the training
+// passes. CPU reference: `through_sigma` of src/gaussian/gradient.rs; equations: section 7.4 of the 4DGS model.
 #define_import_path gs4d::slice_backward
 
 #import gs4d::training::TrainedRecord
@@ -12,8 +12,8 @@ struct SliceGradient {
     rotation_r: vec4<f32>,
 }
 
-// Returns the gradients with respect to raw scales and rotations, given the gradients with respect to the conditional covariance
-// (symmetric), the velocity c / v and the temporal variance v. `sliced` is the slice of `raw`.
+// Returns the gradients with respect to raw scales and rotations, given the gradients with respect to the conditional
+// covariance (symmetric), the velocity c / v and the temporal variance v. `sliced` is the slice of `raw`.
 fn through_slice(
     raw: TrainedRecord,
     model: u32,
@@ -75,8 +75,8 @@ fn raw_rotation(raw: vec4<f32>, unit: vec4<f32>, gradient: vec4<f32>) -> vec4<f3
     return (gradient - unit * dot(unit, gradient)) / length(raw);
 }
 
-// `left_gradient` and `right_gradient` return the gradients with respect to l and r, given the gradients with respect to the matrices L and
-// R of `left_matrix` and `right_matrix`. Matrices are m[column][row].
+// `left_gradient` and `right_gradient` return the gradients with respect to l and r, given the gradients with respect
+// to the matrices L and R of `left_matrix` and `right_matrix`. Matrices are m[column][row].
 fn left_gradient(h: mat4x4<f32>) -> vec4<f32> {
     return vec4(
         h[0][0] + h[1][1] + h[2][2] + h[3][3],
@@ -95,7 +95,8 @@ fn right_gradient(k: mat4x4<f32>) -> vec4<f32> {
     );
 }
 
-// Returns the gradient with respect to a unit quaternion, given the gradient g[column][row] with respect to its rotation matrix.
+// Returns the gradient with respect to a unit quaternion, given the gradient g[column][row] with respect to its
+// rotation matrix.
 fn rotation_gradient(q: vec4<f32>, g: mat3x3<f32>) -> vec4<f32> {
     let w = q.x;
     let x = q.y;

@@ -1,5 +1,5 @@
-// The trained form: raw parameters as the optimizer stores them. CPU reference: src/gaussian/slice.rs. Axes are x, y, z, t; quaternions
-// are (w, x, y, z), rotations use the flipped convention.
+// The trained form: raw parameters as the optimizer stores them. CPU reference: src/gaussian/slice.rs. Axes are x, y,
+// z, t; quaternions are (w, x, y, z), rotations use the flipped convention.
 #define_import_path gs4d::trained
 
 #import gs4d::training::TrainedRecord
@@ -8,7 +8,8 @@ const STATIC_3D: u32 = 0u;
 const UNROTATED_4D: u32 = 1u;
 const ROTATED_4D: u32 = 2u;
 
-// `left_matrix` and `right_matrix` return the factors L and R of the 4D rotation Q = L R of the unit quaternions l and r.
+// `left_matrix` and `right_matrix` return the factors L and R of the 4D rotation Q = L R of the unit quaternions l and
+// r.
 fn left_matrix(l: vec4<f32>) -> mat4x4<f32> {
     return mat4x4(
         vec4(l.x, -l.y, l.z, -l.w),
@@ -38,14 +39,16 @@ fn rotation_3d(q: vec4<f32>) -> mat3x3<f32> {
     );
 }
 
-// A sliced Gaussian: conditional covariance, covariance of position with time c, temporal variance v (without the prefilter).
+// A sliced Gaussian: conditional covariance, covariance of position with time c, temporal variance v (without the
+// prefilter).
 struct Sliced {
     covariance: mat3x3<f32>,
     c: vec3<f32>,
     v: f32,
 }
 
-// Returns the slice of a Gaussian. The columns of M = Q S are the columns of the rotation times the scales; the covariance is M transpose(M).
+// Returns the slice of a Gaussian. The columns of M = Q S are the columns of the rotation times the scales; the
+// covariance is M transpose(M).
 fn slice_of(trained: TrainedRecord, model: u32) -> Sliced {
     let scale = exp(trained.log_scale.xyz);
     let l = normalize(trained.rotation_l);

@@ -1,4 +1,5 @@
-// Structures of the passes of the offline half, identical to those in src/offline/layout.rs (a test compares every offset).
+// Structures of the passes of the offline half, identical to those in src/offline/engine/layout.rs (a test compares
+// every offset).
 #define_import_path gs4d::training
 
 // The raw parameters of one Gaussian, or their gradients. Quaternions are (w, x, y, z).
@@ -59,7 +60,7 @@ struct LossUniforms {
 
 // Input of `exposure` for one view.
 struct ExposureUniforms {
-    // Background color; w: 1, or 0 if what is behind the Gaussians is exposed too.
+    // Background color; w: 1, or 0 if the exposure also applies to the background.
     background: vec4<f32>,
     size: vec2<u32>,
     tiles: vec2<u32>,
@@ -97,26 +98,13 @@ struct AdamUniforms {
     end: vec2<u32>,
 }
 
-// Input of `regularize`: the weights of its terms for each Gaussian.
-struct TermWeights {
-    // Weight of the length of its velocity.
-    motion: f32,
-    // Weight of the length of the difference between its velocity and the velocity of a neighbor at the same position.
-    rigid: f32,
-    // Weight of its opacity.
-    opacity: f32,
-    // Weight of each of its spatial scales.
-    scale: f32,
-    // The weight of a neighbor is exp(-falloff distance).
-    falloff: f32,
-}
-
 // Input of `noise` for one step.
 struct NoiseUniforms {
     count: u32,
     // Seed of the step.
     seed: u32,
-    // Factor on the variance along an axis that gives the deviation of the noise of a fully transparent Gaussian along it.
+    // Factor on the variance along an axis that gives the deviation of the noise of a fully transparent Gaussian along
+    // it.
     strength: f32,
     // Least logarithm of the temporal scale.
     least_log_scale_t: f32,
@@ -140,7 +128,7 @@ struct RelocationUniforms {
     moves: u32,
     // Four-vectors of the color of each Gaussian.
     stride: u32,
-    // 1: Gaussians that others get their colors from keep their moments.
+    // 1: sources keep their moments.
     keeps: u32,
     // Index of the first Gaussian of the part among all.
     first: u32,

@@ -1,8 +1,9 @@
-//! Bits that an unusually large range needs in addition.
+//! Additional bits for an unusually large range.
 //!
 //! In: the size of the range of an attribute, and the usual size. Out: a number of bits.
 
-/// Returns the additional bits of values in a range of this size with which they are no coarser than over a range of the usual size.
+/// Returns the number of bits, at most 16, to add for values in a range of `size`, so that their steps are no coarser
+/// than in a range of the `usual` size.
 pub(super) fn additional_bits(size: f64, usual: f64) -> u32 {
     let times = size / usual;
     if times.is_finite() { times.log2().ceil().clamp(0.0, 16.0) as u32 } else { 0 }

@@ -1,11 +1,13 @@
 //! Temporal means near the time interval, for the packed form, which has one range for all temporal means.
 //!
-//! In: Gaussians, the time interval, timestamp units. Out: the same Gaussians at the same positions at all times. Gaussians whose temporal mean
-//! was far from the interval have nearly the same opacity as before; Gaussians that are never drawn are still never drawn.
+//! In: Gaussians, the time interval, timestamp units. Out: the same Gaussians at the same positions at all times.
+//! Gaussians whose temporal mean was far from the interval have nearly the same opacity as before; Gaussians that are
+//! never drawn are still never drawn.
 //!
-//! In the interval, such a Gaussian shows a flank of its marginal. A marginal with a nearer mean, of the same value and slope in the middle of
-//! the interval, differs in curvature alone. The temporal mean moves by whole intervals, the period of the time harmonics. Colors are evaluated
-//! in the direction of the mean, which moves too: they change where the mean moves by much of the distance to the camera.
+//! In the interval, such a Gaussian shows a flank of its marginal. A marginal with a nearer mean, of the same value and
+//! slope in the middle of the interval, differs in curvature alone. The temporal mean moves by whole intervals, the
+//! period of the time harmonics. Colors are evaluated in the direction of the mean, which moves too: they change where
+//! the mean moves by much of the distance to the camera.
 
 use crate::gaussian::Gaussian;
 use rayon::prelude::*;
@@ -16,10 +18,12 @@ const FAR: f64 = 4.0;
 const NEAR: f64 = 0.5;
 /// Largest relative change of a marginal by its curvature, within the limits of the distance.
 const CHANGE: f64 = 0.002;
-/// Largest temporal deviation, lengths of the interval: the packed form has one range for all, and longer deviations look nearly the same.
+/// Largest temporal deviation, lengths of the interval: the packed form has one range for all, and longer deviations
+/// look nearly the same.
 const LONG: f64 = 1000.0;
 
-/// Moves temporal means that are far from the interval close to it. `cutoff` is the marginal at and below which a Gaussian is not drawn.
+/// Moves temporal means that are far from the interval close to it. `cutoff` is the marginal at and below which a
+/// Gaussian is not drawn.
 pub(crate) fn move_near(gaussians: &mut [Gaussian], interval: [f32; 2], cutoff: f32) {
     let [start, end] = interval.map(f64::from);
     let (middle, span) = (0.5 * (start + end), end - start);
@@ -36,8 +40,8 @@ fn move_one(gaussian: &mut Gaussian, middle: f64, span: f64, cutoff: f32) {
         return;
     }
     let sigma_t = f64::from(gaussian.sigma_t);
-    // At the ends of the interval, the logarithm of the marginal differs by slope × span² / (8 near). A near mean multiplies rounding errors
-    // of the velocity by a short time.
+    // At the ends of the interval, the logarithm of the marginal differs by slope × span² / (8 near). A near mean
+    // multiplies rounding errors of the velocity by a short time.
     let slope = distance / (sigma_t * sigma_t);
     let nearest = (slope * span * span / (8.0 * CHANGE)).clamp(NEAR * span, (FAR - 1.0) * span);
     // A whole number of intervals, except for distances so large that an interval is less than their rounding.

@@ -1,18 +1,18 @@
-//! Whether packed Gaussians are stored with enough digits for their size.
+//! Whether packed means are precise enough for the size of their Gaussians.
 //!
-//! In: a packed scene. Out: the share of its Gaussians whose place may be off by a part of their size that is seen.
+//! In: a packed scene. Out: the share of its Gaussians whose mean may have a visible error.
 
 use super::lanes::{self, BlockRanges, LANE_MAX};
 use super::scene::PackedScene;
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// Error of a mean, as a part of the size of its Gaussian, from which it is seen.
+/// Error of a mean from which on it is visible, as a fraction of the size of the Gaussian.
 const SEEN: f32 = 0.5;
 
 impl PackedScene {
-    /// Returns the share of the Gaussians, weighted by opacity, whose mean may be off by more than half of their size, because other Gaussians of their
-    /// block are far away. 0 if no Gaussian is visible.
+    /// Returns the share of the Gaussians, weighted by opacity, whose mean may have an error of more than half of their
+    /// size, because other Gaussians of their block are far away. 0 if no Gaussian is visible.
     pub fn coarse_share(&self) -> f64 {
         let of_one = |index| {
             let opacity = f64::from(self.gaussian(index).opacity);
@@ -25,8 +25,8 @@ impl PackedScene {
     }
 
     fn is_coarse(&self, index: usize) -> bool {
-        // The low bits of lanes of fewer bits are 0, by chance also those of a record, but rarely of two. Lanes that are all 0 are the corner of the box,
-        // which is exact.
+        // The low bits of lanes with fewer bits are 0. In one record with all bits they may be 0 by chance, but rarely
+        // in two. A mean whose lanes are all 0 is the corner of the box, which is exact.
         let bits = self.bits_of_mean(index) | self.bits_of_mean(index ^ 1);
         let step = if bits == 0 { 0.0 } else { f32::from(1u16 << bits.trailing_zeros()) / LANE_MAX };
         let error = 0.5 * step * Vec3::from(BlockRanges::read(&self.ranges, index).mean_size).length();
@@ -49,7 +49,8 @@ mod tests {
     use crate::gaussian::{Gaussian, Harmonics};
     use bytemuck::Zeroable;
 
-    /// Returns 256 Gaussians of the size 0.02 √3 in a box of this length, packed.
+    /// Returns the coarse share of 256 Gaussians of the size 0.02 √3 in a box of this length, packed with `mean` bits
+    /// per mean.
     fn coarse_share(length: f32, mean: u32) -> f64 {
         let gaussian = |index: u16| {
             let place = |factor: u16| f32::from(index * factor % 257) / 256.0 * length;

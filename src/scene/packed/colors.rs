@@ -1,8 +1,8 @@
-//! Colors coded by codebooks: a first coefficient for each Gaussian, and the others as a sum of entries, one from each
-//! of up to four codebooks.
+//! Colors coded by codebooks: a DC coefficient for each Gaussian, and the others as a sum of entries, one from each of
+//! up to four codebooks.
 //!
-//! In: first coefficients, and codebooks with a code for every Gaussian. Out: [`CodedColors`], the words that the GPU
-//! reads; and the coefficients decoded from them. `offline::quantize::codebook` trains the codebooks.
+//! In: DC coefficients, and codebooks with a code for every Gaussian. Out: [`CodedColors`], the words that the GPU
+//! reads; and the coefficients decoded from them. `offline::compress::codebook` trains the codebooks.
 
 use super::additional_bits::additional_bits;
 use super::lanes::{self, BASE_MAX, COLOR_WORDS, MAX_ENTRIES, MAX_STAGES};
@@ -12,7 +12,7 @@ use glam::Vec3;
 use half::f16;
 use rayon::prelude::*;
 
-/// Usual range of first coefficients. A larger range has more bits. Those of trained captures are 5 to 10.
+/// Usual size of the range of DC coefficients. A larger range has more bits. Trained captures have 5 to 10.
 const BASES: f32 = 16.0;
 
 /// Colors coded by codebooks.
@@ -22,11 +22,12 @@ pub struct CodedColors {
     pub degree: u32,
     /// Time degree evaluated, 0 to 2.
     pub degree_t: u32,
-    /// One record for each Gaussian: the first coefficient (10 bits for each channel), then four codes of 16 bits.
+    /// One record for each Gaussian: the DC coefficient (10 bits for each channel), then four codes of 16 bits.
     pub records: Vec<[u32; COLOR_WORDS]>,
     /// Number of entries of each codebook.
     pub entries: Vec<u32>,
-    /// All codebooks: `words_per_entry` words for each entry, four signed bytes to a word, RGB innermost, first coefficient 0.
+    /// All codebooks: `words_per_entry` words for each entry, four signed bytes to a word, RGB innermost, DC
+    /// coefficient 0.
     pub codebooks: Vec<u32>,
     /// Value of a byte of 127: `words_per_entry` four-vectors for each codebook.
     pub scales: Vec<[f32; 4]>,
@@ -50,9 +51,9 @@ impl CodedColors {
             + size_of_val(self.scales.as_slice())
     }
 
-    /// Creates colors of these degrees, without codebooks, from the first coefficient of each Gaussian, RGB, quantized
-    /// to `bits` bits for each channel, 1 to 10; a large range has more, up to 10. Also returns the range (low, high) of
-    /// the first coefficients.
+    /// Creates colors of these degrees, without codebooks, from the DC coefficient of each Gaussian, RGB, quantized to
+    /// `bits` bits for each channel, 1 to 10; a large range has more, up to 10. Also returns the range (low, high) of
+    /// the DC coefficients.
     pub fn of_base(degree: u32, degree_t: u32, base: &[[f32; 3]], bits: u32) -> (Self, [f32; 2]) {
         let values = base.as_flattened().iter();
         let (low, high) = values.fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
@@ -68,9 +69,9 @@ impl CodedColors {
         (Self { degree, degree_t, records, ..Self::default() }, [low, low + size * (BASE_MAX / 1022.0)])
     }
 
-    /// Adds a codebook. A row holds every coefficient but the first, RGB innermost: `entries` are rows of signed bytes,
-    /// one after the other, `scales` is one row with the values of a byte of 127, and `codes` has the entry of each
-    /// Gaussian.
+    /// Adds a codebook. A row holds every coefficient but the DC coefficient, RGB innermost: `entries` are rows of
+    /// signed bytes, one after the other, `scales` is one row with the values of a byte of 127, and `codes` has the
+    /// entry of each Gaussian.
     ///
     /// # Panics
     /// If there are four codebooks already, or if `scales` is empty or longer than a row.
@@ -96,8 +97,8 @@ impl CodedColors {
         lanes::unpack_code(self.records[index], stage)
     }
 
-    /// Returns the sum of a Gaussian's entries in all codebooks, RGB innermost, padded to whole words. The codebooks written here have 0 in
-    /// the place of the first coefficient; what other files have there is added to it.
+    /// Returns the sum of a Gaussian's entries in all codebooks, RGB innermost, padded to whole words. The codebooks
+    /// written here have 0 in place of the DC coefficient; other values there are added to the DC coefficient.
     ///
     /// # Panics
     /// If `index` is out of range.
@@ -118,8 +119,8 @@ impl CodedColors {
         rest
     }
 
-    /// Returns the values of the four bytes of a word of an entry; `scale` is the value of a byte of 127. They have half
-    /// precision, which is finer than the bytes; a GPU stores them, and does not compute them for each color.
+    /// Returns the values of the four bytes of a word of an entry; `scale` is the value of a byte of 127. They have
+    /// half precision, which is finer than the bytes; a GPU stores them, and does not compute them for each color.
     pub fn values(word: u32, scale: &[f32; 4]) -> [f16; 4] {
         let bytes = word.to_le_bytes();
         std::array::from_fn(|i| {
@@ -138,12 +139,12 @@ impl CodedColors {
         self.codebooks.chunks_exact(words).zip(scales)
     }
 
-    /// Returns the first coefficient of a Gaussian; `low` and `size` are its range.
+    /// Returns the DC coefficient of a Gaussian; `low` and `size` are its range.
     fn base(&self, index: usize, [low, size]: [f32; 2]) -> Vec3 {
         Vec3::from(lanes::unpack_base(self.records[index]).map(|place| low + place as f32 / BASE_MAX * size))
     }
 
-    /// Returns the color of one Gaussian, whose first coefficient is in the range `base`; see [`Harmonics::color`].
+    /// Returns the color of one Gaussian, whose DC coefficient is in the range `base`; see [`Harmonics::color`].
     pub(super) fn color(&self, index: usize, base: [f32; 2], direction: Vec3, tau: f32, time_span: f32) -> Vec3 {
         let basis = harmonics::basis(direction);
         let rest = self.rest(index);
@@ -159,7 +160,7 @@ impl CodedColors {
         (color + 0.5).max(Vec3::ZERO).min(Vec3::splat(BRIGHTEST))
     }
 
-    /// Returns all coefficients of all Gaussians, whose first coefficients are in the range `base`.
+    /// Returns all coefficients of all Gaussians, whose DC coefficients are in the range `base`.
     pub(super) fn harmonics(&self, base: [f32; 2]) -> Harmonics {
         let coefficients = self.coefficients();
         let mut values = Vec::with_capacity(self.records.len() * coefficients * 3);
@@ -196,8 +197,8 @@ impl CodedColors {
         if self.records.par_iter().all(fits) { Ok(()) } else { Err("a code beyond its codebook") }
     }
 
-    /// Lowers the degrees to at most the degrees given and removes the coefficients that are no longer evaluated from the
-    /// codebooks. At degree 0 the codebooks would be empty, and are removed too.
+    /// Lowers the degrees to at most the degrees given and removes the coefficients that are no longer evaluated from
+    /// the codebooks. At degree 0 the codebooks would be empty, and are removed too.
     pub fn truncate(&mut self, degree: u32, degree_t: u32) {
         let (all, before) = (self.coefficients(), self.words_per_entry());
         self.degree = self.degree.min(degree);
@@ -229,7 +230,7 @@ impl CodedColors {
     }
 }
 
-/// Returns a row after a first coefficient of 0, padded to whole words.
+/// Returns a row after a DC coefficient of 0, padded to whole words.
 fn padded<T: Copy + Default>(row: &[T], words: usize) -> Vec<[T; 4]> {
     let mut fours = vec![[T::default(); 4]; words];
     fours.as_flattened_mut()[3..][..row.len()].copy_from_slice(row);

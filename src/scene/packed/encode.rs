@@ -4,13 +4,13 @@
 //! packed already. Out: a [`PackedScene`]. An attribute of fewer than 16 bits leaves the low bits of its lanes zero,
 //! which costs nothing on disk; the largest splats keep all 16, since their errors are the most visible.
 //!
-//! A range that a few values stretch has more bits, so that these do not take the digits of the others.
+//! A range that a few values stretch has more bits, so that the other values keep their precision.
 
 use super::additional_bits::additional_bits;
 use super::lanes::{self, ALWAYS, AT_REST, BLOCK, BlockRanges, FARTHEST, LANE_MAX, SharedRanges};
 use super::scene::{PackedColors, PackedScene};
 use super::shape::{Shape, smallest_three};
-use super::strays::{is_coarse, squared_size};
+use super::strays::{loses_precision, squared_size};
 use crate::gaussian::Gaussian;
 use crate::scene::Bounds;
 use rayon::prelude::*;
@@ -21,26 +21,28 @@ use std::f64::consts::FRAC_1_SQRT_2;
 /// Trained captures have scales a thousand times smaller, which are not visible and would waste half the range. This
 /// floor has no visible effect up to 100 dB.
 const FLATTEST: f32 = 1.0 / 16_384.0;
-/// In scenes of objects far apart that radius is large. If the smallest scale would be more than the first part of the usual size of a Gaussian, it is
-/// the second part of that size.
+/// Two fractions of the median size of the Gaussians. In scenes of objects far apart the radius of the core is large:
+/// if the smallest scale would be above the first fraction, it is the second.
 const OF_USUAL: [f64; 2] = [1.0 / 16.0, 1.0 / 64.0];
-/// Usual ranges of the logarithms of scales and of σ_t. A larger range has more bits. Those of trained captures are 8 to 11.
+/// Usual sizes of the ranges of the logarithms of scales and of σ_t. A larger range has more bits. Trained captures
+/// have 8 to 11.
 const LOG_SCALES: f64 = 14.0;
 const LOG_SIGMAS: f64 = 20.0;
-/// Largest displacement of a block, in displacements of which nine tenths of the moving Gaussians have less, from which the block has 16 bits. In
-/// blocks of trained captures it is at most 40.
+/// A block has 16 bits if its largest displacement is more than this multiple of the ninth decile of its displacements
+/// above 0. The multiple is at most 40 in blocks of trained captures.
 const FASTEST: f64 = 256.0;
 
 /// Number of bits of each attribute. Default: no visible difference.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Bits {
-    /// Mean, per axis, within the box of its block; 1 to 16. A block whose steps would be large for its Gaussians has 16.
+    /// Mean, per axis, within the box of its block; 1 to 16. A block whose steps would be coarse for its Gaussians
+    /// has 16.
     pub mean: u32,
     /// Temporal mean, within two lengths of the time interval; 1 to 16. A larger range has more, up to 16.
     pub mean_t: u32,
-    /// Displacement within one σ_t or the time interval, whichever is shorter, per axis; 2 to 16. A block in which few are far
-    /// larger than the others has 16.
+    /// Displacement within one σ_t or the time interval, whichever is shorter, per axis; 2 to 16. A block in which a
+    /// few displacements are far larger than the others has 16.
     pub velocity: u32,
     /// Logarithm of σ_t; 1 to 15. A range of more than a factor of 10⁸ has more, up to 15.
     pub sigma_t: u32,
@@ -52,7 +54,8 @@ pub struct Bits {
     pub opacity: u32,
     /// Base color, per channel, where colors are coded; 1 to 10. A large range has more, up to 10.
     pub base: u32,
-    /// Fraction of the Gaussians, those with the largest splats, that keep 16 bits for scale, rotation and mean; 0 to 1.
+    /// Fraction of the Gaussians, those with the largest splats, that keep 16 bits for scale, rotation and mean; 0
+    /// to 1.
     pub escape: f32,
 }
 
@@ -73,7 +76,7 @@ impl Default for Bits {
 }
 
 impl PackedScene {
-    /// Packs Gaussians, keeping their order. `base` is the range (low, high) of coded first coefficients, as
+    /// Packs Gaussians, keeping their order. `base` is the range (low, high) of coded DC coefficients, as
     /// [`CodedColors::of_base`](super::CodedColors::of_base) returns it; `reach` is the longest time over which motion
     /// matters, the length of the time interval in timestamp units.
     pub fn encode(gaussians: &[Gaussian], bits: &Bits, colors: PackedColors, base: [f32; 2], reach: f32) -> Self {
@@ -113,7 +116,7 @@ impl PackedScene {
                 |gaussian: &Gaussian| displacement(gaussian).into_iter().fold(0.0f64, |most, d| most.max(d.abs()));
             let farthest: Vec<f64> = chunk.iter().filter(finite).map(farthest).collect();
             let most = farthest.iter().copied().fold(0.0, f64::max);
-            let of_mean = if is_coarse(chunk) { Quantizer::new(16) } else { quantizers.mean };
+            let of_mean = if loses_precision(chunk.iter()) { Quantizer::new(16) } else { quantizers.mean };
             let of_velocity = if is_stretched(farthest) { SignedQuantizer::new(16) } else { quantizers.velocity };
             let ends = mean.map(|span| span.range(of_mean));
             let block_ranges = BlockRanges {
@@ -213,7 +216,8 @@ impl Span {
     }
 }
 
-/// Quantizes fractions of the largest displacement, −1 to 1, by their signed square root, since most displacements are small.
+/// Quantizes fractions of the largest displacement, −1 to 1, by their signed square root, since most displacements are
+/// small.
 #[derive(Clone, Copy)]
 struct SignedQuantizer {
     bits: u32,
@@ -275,7 +279,7 @@ fn flattest(gaussians: &[Gaussian]) -> f64 {
     if usual > 0.0 && flattest > most { instead } else { flattest }
 }
 
-/// Returns whether few of the displacements of a block are so much larger than the others that these would lose their digits.
+/// Returns whether a few displacements of a block are so large that the others would lose precision.
 fn is_stretched(mut displacements: Vec<f64>) -> bool {
     displacements.retain(|&displacement| displacement > 0.0);
     let Some(last) = displacements.len().checked_sub(1) else { return false };
@@ -283,7 +287,7 @@ fn is_stretched(mut displacements: Vec<f64>) -> bool {
     most > FASTEST * *displacements.select_nth_unstable_by(last * 9 / 10, f64::total_cmp).1
 }
 
-/// Returns for each Gaussian whether its splats are among the largest and most opaque.
+/// Returns for each Gaussian whether it is in the fraction with the largest and most opaque splats.
 fn largest(gaussians: &[Gaussian], shapes: &[Shape], fraction: f32) -> Vec<bool> {
     let count = ((gaussians.len() as f32 * fraction.clamp(0.0, 1.0)).round() as usize).min(gaussians.len());
     let size = |(gaussian, shape): (&Gaussian, &Shape)| {

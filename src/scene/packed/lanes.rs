@@ -16,7 +16,7 @@
 //! | 14 | opacity | 0 to 1 |
 //! | 15 | which component of the rotation (w, x, y, z) is left out | |
 //!
-//! A record of coded color is one word with three positions of 10 bits, the first coefficient, and two words with four
+//! A record of coded color is one word with three positions of 10 bits, the DC coefficient, and two words with four
 //! codes of 16 bits.
 
 /// Number of Gaussians in a block, for which the range of the means is stored.
@@ -38,7 +38,7 @@ pub const MAX_ENTRIES: u32 = 1 << 16;
 pub(super) const LANES: usize = 2 * RECORD_WORDS;
 /// Largest value of a lane.
 pub(super) const LANE_MAX: f32 = 65535.0;
-/// Largest position of the first coefficient of a coded color.
+/// Largest position of the DC coefficient of a coded color.
 pub(super) const BASE_MAX: f32 = 1023.0;
 
 /// First lane of the mean.
@@ -79,21 +79,21 @@ pub(super) struct SharedRanges {
     pub rotation_stretch: f32,
     /// Factor on the position of the opacity.
     pub opacity_stretch: f32,
-    /// Low end and size of the first coefficient of coded colors.
+    /// Low end and size of the DC coefficient of coded colors.
     pub base: [f32; 2],
 }
 
 /// Ranges of the lanes of one block.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BlockRanges {
-    /// Low corner of the box of the means, capture units.
+    /// Low corner of the box of the means, capture space.
     pub mean_low: [f32; 3],
-    /// Its size.
+    /// Size of the box, capture units.
     pub mean_size: [f32; 3],
     /// Largest displacement, capture units.
     pub displacement: f32,
-    /// 1 over the length of the time interval: velocity = displacement · max(1 / σ_t, rate), since no motion is seen
-    /// for longer.
+    /// 1 over the length of the time interval: velocity = displacement · max(1 / σ_t, rate), since motion is visible in
+    /// the interval only.
     pub rate: f32,
 }
 
@@ -154,12 +154,12 @@ pub(super) fn left_out(record: [u32; RECORD_WORDS]) -> u32 {
     record[LEFT_OUT / 2] >> (16 * (LEFT_OUT % 2)) & 0xffff
 }
 
-/// Returns the color record of the positions of a first coefficient, with every code 0.
+/// Returns the color record of the positions of a DC coefficient, with every code 0.
 pub(super) fn pack_base([r, g, b]: [u32; 3]) -> [u32; COLOR_WORDS] {
     [r | g << 10 | b << 20, 0, 0]
 }
 
-/// Returns the positions of the first coefficient of a color record.
+/// Returns the positions of the DC coefficient of a color record.
 pub(super) fn unpack_base(record: [u32; COLOR_WORDS]) -> [u32; 3] {
     [0, 10, 20].map(|shift| record[0] >> shift & 1023)
 }

@@ -8,13 +8,13 @@
 //! | `scene.rs` | the packed form, and its checks |
 //! | `lanes.rs` | the position and the range of each value in a record, for the encoder and the decoder |
 //! | `pack.rs` | from a scene to its packed form |
-//! | `anchor.rs` | temporal means near the time interval |
-//! | `order.rs` | the order of the Gaussians: neighbors share a box |
+//! | `anchor.rs` | moves temporal means close to the time interval |
+//! | `order.rs`, `morton.rs` | the order of the Gaussians: neighbors share a box |
 //! | `strays.rs` | Gaussians far from the others, which have blocks of their own |
-//! | `encode.rs` | from Gaussians to records and ranges |
+//! | `encode.rs`, `additional_bits.rs` | from Gaussians to records and ranges |
 //! | `decode.rs` | from records and ranges to Gaussians and colors |
 //! | `rounding.rs` | the change of a Gaussian by packing |
-//! | `coarseness.rs` | whether Gaussians are stored with enough digits for their size |
+//! | `coarseness.rs` | whether means are precise enough for the size of their Gaussians |
 //! | `shape.rs` | a covariance as scales and a rotation, and back |
 //! | `colors.rs` | colors by codebook, and back |
 

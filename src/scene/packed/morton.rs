@@ -4,7 +4,8 @@
 
 use crate::gaussian::Gaussian;
 
-/// Returns whether the place of an order fills a block: its index is that of the place before. A filler is stored with opacity 0.
+/// Returns whether the entry at `place` of an order is a filler of a block: it repeats the entry before. A filler is
+/// stored with opacity 0.
 pub fn is_filler(order: &[u32], place: usize) -> bool {
     place > 0 && order[place] == order[place - 1]
 }

@@ -1,15 +1,16 @@
 //! The order in which packed Gaussians are stored: neighbors in space follow each other.
 //!
-//! In: means. Out: a permutation by Morton code (Z-order), so that blocks have small boxes and columns compress. If some Gaussians are so far from
-//! the others that these would lose digits, it has fillers, too ([`is_filler`]), so that they have blocks of their own.
+//! In: means. Out: a permutation by Morton code (Z-order), so that blocks have small boxes and columns compress. If
+//! some Gaussians are so far away that the others would lose precision, the order also has fillers ([`is_filler`]), so
+//! that distant Gaussians are in blocks of their own.
 
 use super::morton::by_code;
 pub use super::morton::is_filler;
 use super::strays::set_apart;
 use crate::gaussian::Gaussian;
 
-/// Returns the indices of the Gaussians in Morton order of their means; equal codes keep their order. Gaussians far from the others are last, and
-/// groups far apart begin a block each, if blocks would lose digits otherwise.
+/// Returns the indices of the Gaussians in Morton order of their means; equal codes keep their order. If blocks would
+/// lose precision, Gaussians far from the others are last, and groups far apart begin a block each.
 pub fn morton_order(gaussians: &[Gaussian]) -> Vec<u32> {
     let order = by_code(gaussians, (0..gaussians.len() as u32).collect());
     set_apart(gaussians, order)

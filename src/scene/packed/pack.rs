@@ -1,7 +1,8 @@
 //! Packing: from a sliced scene to the packed form.
 //!
-//! In: a scene in the runtime form, and a [`Packing`]. Out: the same scene in the packed form, its Gaussians in Morton order, and invisible ones that
-//! fill blocks if some are far from the others; or why the packed form cannot hold it. Codebooks of color are trained elsewhere (feature `offline`), and packed by the same functions.
+//! In: a scene in the runtime form, and a [`Packing`]. Out: the same scene in the packed form, its Gaussians in Morton
+//! order, with invisible fillers of blocks if some Gaussians are far from the others; or why the packed form cannot
+//! hold it. Codebooks of color are trained elsewhere (feature `offline`), and packed by the same functions.
 
 use super::anchor::move_near;
 use super::encode::Bits;
@@ -21,8 +22,8 @@ use serde::{Deserialize, Serialize};
 pub struct Packing {
     /// Bits of the attributes of the geometry.
     pub bits: Bits,
-    /// Color coefficients are rounded to multiples of this, so that they compress; 0 keeps them as they are. A step above 0 must be a
-    /// normal number: multiples of a subnormal one are not accurate. Default: 1/256.
+    /// Color coefficients are rounded to multiples of this, so that they compress; 0 keeps them as they are. A step
+    /// above 0 must be a normal number: multiples of a subnormal one are not accurate. Default: 1/256.
     pub color_step: f32,
 }
 
@@ -44,20 +45,20 @@ pub enum PackError {
     /// The values of the scene have too large a range.
     #[error("the scene does not fit the packed form ({0}): keep it in the runtime form, or prune it first")]
     Range(&'static str),
-    /// A Gaussian could not be drawn any more.
+    /// A Gaussian could no longer be drawn.
     #[error(
         "Gaussian {index} does not fit the packed form ({reason}): keep the scene in the runtime form, or prune it first"
     )]
     Extreme {
         /// Its index in the scene.
         index: u32,
-        /// What would be wrong with it.
+        /// Its fault after packing.
         reason: &'static str,
     },
 }
 
 impl Packing {
-    /// Checks that colors can be rounded so.
+    /// Checks that colors can be rounded to multiples of the step.
     ///
     /// # Errors
     /// [`PackError::ColorStep`].
@@ -68,8 +69,9 @@ impl Packing {
 }
 
 impl RuntimeScene {
-    /// Returns the scene in the packed form, with whole colors and without levels of detail. A support filter is computed again. If some Gaussians are
-    /// so far from the others that these would lose digits, invisible Gaussians are added, which fill blocks.
+    /// Returns the scene in the packed form, with whole colors and without levels of detail. A support filter is
+    /// computed again. If some Gaussians are so far away that the others would lose precision, invisible Gaussians are
+    /// added, which fill blocks.
     ///
     /// # Errors
     /// A scene that is packed already, a packing that is invalid, values that the packed form cannot hold.
@@ -84,7 +86,8 @@ impl RuntimeScene {
     }
 }
 
-/// Packs a sliced scene whose temporal means are near the interval in the given order, with colors and their range in that order.
+/// Packs a sliced scene whose temporal means are near the interval in the given order, with colors and their range in
+/// that order.
 ///
 /// # Errors
 /// As [`RuntimeScene::pack`].
@@ -138,7 +141,8 @@ pub(crate) fn check_each(packed: &PackedScene, order: &[u32]) -> Result<(), Pack
     (0..order.len()).into_par_iter().find_map_first(extreme).map_or(Ok(()), Err)
 }
 
-/// Rounds coefficients to multiples of `step`, if it is positive. Those whose multiple single precision cannot hold stay as they are.
+/// Rounds coefficients to multiples of `step`, if it is positive. Those whose multiple single precision cannot hold
+/// stay as they are.
 fn rounded(mut harmonics: Harmonics, step: f32) -> Harmonics {
     let multiple = |value: f32| (value / step).round() * step;
     if step > 0.0 {
@@ -173,12 +177,16 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_packed_is_refused() {
+    fn packed_scenes_and_invalid_color_steps_are_refused() {
         let packed = sliced().pack(&Packing::default()).expect("the scene fits");
-        assert_eq!(packed.pack(&Packing::default()).err(), Some(PackError::AlreadyPacked), "values are rounded once");
+        assert_eq!(
+            packed.pack(&Packing::default()).err(),
+            Some(PackError::AlreadyPacked),
+            "a packed scene would be rounded twice"
+        );
         for color_step in [-1.0, f32::NAN, 1e-40] {
             let refused = sliced().pack(&Packing { color_step, ..Packing::default() });
-            assert!(matches!(refused, Err(PackError::ColorStep(_))), "a step of {color_step}");
+            assert!(matches!(refused, Err(PackError::ColorStep(_))), "a step of {color_step} is refused");
         }
     }
 }

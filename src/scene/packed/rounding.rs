@@ -1,10 +1,12 @@
-//! The change of a Gaussian by packing, so that training can draw a Gaussian that moves as if it were packed.
+//! The change that packing makes to a Gaussian, so that training can draw a Gaussian as if it were packed.
 //!
-//! In: a packed scene, the Gaussian that a record was encoded from. Out: its [`Rounding`], which maps that Gaussian to the decoded one, and
-//! a Gaussian close to it to one close to the decoded one. CPU reference of `shaders/offline/rounding.wgsl`.
+//! In: a packed scene, the Gaussian that a record was encoded from. Out: a [`Rounding`], which maps that Gaussian to
+//! the decoded one, and Gaussians close to it to Gaussians close to the decoded one. CPU reference of
+//! `shaders/offline/rounding.wgsl`.
 //!
-//! A difference is added to each attribute that may have any value. A shape is rotated and stretched instead: the difference of two
-//! covariances, added to the covariance of a flat Gaussian that has rotated a little since, would result in a negative variance.
+//! A difference is added to each attribute that may have any value. A shape is rotated and stretched instead: the
+//! difference of two covariances, added to the covariance of a flat Gaussian that has rotated a little since, would
+//! result in a negative variance.
 
 use super::lanes::SharedRanges;
 use super::scene::PackedScene;
@@ -23,8 +25,8 @@ pub struct Rounding {
     pub velocity: Vec3,
     /// Factor on `1/σ_t`; 1 if σ_t is infinite.
     pub rate: f32,
-    /// Added to the variance along every axis before `shape`, capture units squared. It is the variance of the smallest stored scale, to
-    /// which smaller scales have been raised; without it their factors would be unbounded.
+    /// Added to the variance along every axis before `shape`, capture units squared. It is the variance of the smallest
+    /// stored scale, to which smaller scales have been raised; without it their factors would be unbounded.
     pub variance: f32,
     /// Rotates and stretches the shape: from the covariance C and the added variance V to `shape (C + V) shapeᵀ`.
     pub shape: Mat3,
@@ -91,7 +93,8 @@ mod tests {
     const COARSE: Bits =
         Bits { mean: 6, mean_t: 6, velocity: 5, sigma_t: 5, scale: 4, rotation: 4, opacity: 4, base: 8, escape: 0.02 };
 
-    /// Returns Gaussians of many shapes, including needles and disks of no thickness; every fourth is present at every time.
+    /// Returns Gaussians of many shapes, including needles and disks of no thickness; every fourth is present at every
+    /// time.
     fn gaussians() -> Vec<Gaussian> {
         let mut random = Random::new(3);
         let mut three = |low: f32, high: f32| [(); 3].map(|()| random.in_range(low, high));

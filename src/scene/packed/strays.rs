@@ -1,8 +1,8 @@
-//! Gaussians far from the others, and groups of Gaussians far from each other: a block of both has one box for all its means, whose steps are
-//! coarser than the Gaussians are large.
+//! Strays, which are Gaussians far from all others, and groups of Gaussians far from each other: a block that mixes
+//! them has such a large box that the steps of its means are larger than its Gaussians.
 //!
-//! In: Gaussians in Morton order. Out: whether blocks lose digits so; if any does, an order in which each group of neighbors begins a block,
-//! and the strays, Gaussians without neighbors, have the last blocks, those at similar distances together.
+//! In: Gaussians in Morton order. Out: whether blocks lose precision for this reason; if so, an order in which each
+//! group of neighbors begins a block, and strays are in the last blocks, those at similar distances together.
 
 use super::lanes::BLOCK;
 use super::morton::{by_code, is_filler};
@@ -10,51 +10,35 @@ use crate::gaussian::Gaussian;
 use crate::scene::Bounds;
 use glam::{DVec3, Vec3};
 
-/// Steps of a mean along the longest side of the box of its block, with the usual number of bits.
+/// Number of steps of a mean along the longest side of the box of its block, with the usual number of bits.
 const STEPS: f64 = 2048.0;
-/// A block loses digits if its squared steps, weighted by squared opacity, are more than this part of the squared sizes of its Gaussians. Blocks of
-/// trained captures have at most 1/300.
+/// A block loses precision if its squared steps, weighted by squared opacity, are more than this fraction of the
+/// squared sizes of its Gaussians. The fraction is at most 1/300 in blocks of trained captures.
 const COARSE: f64 = 1.0 / 32.0;
-/// Squared sizes count up to this many times the usual one of the block: large Gaussians do not make up for steps that are coarse for the others.
+/// Upper limit of squared sizes in that sum, in medians of the block: large Gaussians do not compensate for steps that
+/// are coarse for the others.
 const LARGE: f64 = 4.0;
-/// The other order is taken if the sum of the squared steps, without those of the strays, falls to less than this part.
+/// The new order is used if it reduces the [`error`] to less than this fraction.
 const GAIN: f64 = 0.75;
-/// Most fillers: as many blocks, and one for every four Gaussians.
+/// Largest number of fillers: those of this many blocks, and one for every four Gaussians.
 const FILLED: usize = 16;
-/// Gaussians in a window. The sizes of windows tell how far neighbors are from each other.
+/// Number of Gaussians in a window. The sizes of windows measure how far apart neighbors are.
 const WINDOW: usize = 8;
-/// Blocks before and behind a block whose windows count.
+/// Number of blocks before and after a block whose windows are included in its median.
 const AROUND: usize = 4;
-/// Sizes of the usual window around a place from which two Gaussians that follow each other are not neighbors.
+/// Two consecutive Gaussians that are farther apart than this many median window sizes are not neighbors.
 const GAP: f64 = 32.0;
-/// Fewest Gaussians of a group that is no group of strays.
+/// Least number of Gaussians of a group: those of smaller groups are strays.
 const FEWEST: usize = 32;
-/// Most rounds of finding strays: without those of one round the order is finer, and the next finds nearer ones.
+/// Largest number of rounds of the search for strays. Without the strays of one round the Morton order is finer, and
+/// the next round finds nearer strays.
 const ROUNDS: usize = 16;
-/// Ratio of the distances of the last and the first stray that share blocks, which have 16 bits.
+/// Largest ratio of the distances of two strays that share blocks, which have 16 bits.
 const WIDE: f64 = 64.0;
 
-/// Returns whether a block, which is not empty, loses digits: the means of its Gaussians are so far apart that the usual steps are large for their sizes.
-pub(super) fn is_coarse(block: &[Gaussian]) -> bool {
-    loses_digits(block.iter())
-}
-
-/// Returns the order with strays and groups apart if that is finer where blocks lose digits, else the order as it is.
-pub(super) fn set_apart(gaussians: &[Gaussian], order: Vec<u32>) -> Vec<u32> {
-    let at = |&index: &u32| &gaussians[index as usize];
-    if !order.chunks(BLOCK).any(|block| loses_digits(block.iter().map(at))) {
-        return order;
-    }
-    let (near, strays) = separated(gaussians, &order);
-    let mut is_stray = vec![false; gaussians.len()];
-    strays.iter().for_each(|&index| is_stray[index as usize] = true);
-    let apart = arranged(gaussians, &near, strays);
-    let most = gaussians.len() + gaussians.len() / 4 + FILLED * BLOCK;
-    let is_finer = || error(gaussians, &apart, &is_stray) < GAIN * error(gaussians, &order, &is_stray);
-    if apart.len() <= most && is_finer() { apart } else { order }
-}
-
-fn loses_digits<'a>(block: impl Iterator<Item = &'a Gaussian> + Clone) -> bool {
+/// Returns whether a nonempty block loses precision: its means are so far apart that the usual steps are coarse for the
+/// sizes of its Gaussians.
+pub(super) fn loses_precision<'a>(block: impl Iterator<Item = &'a Gaussian> + Clone) -> bool {
     let squared_step = step(block.clone()).powi(2);
     let mut sizes: Vec<f64> = block.clone().map(squared_size).collect();
     let middle = sizes.len() / 2;
@@ -66,8 +50,24 @@ fn loses_digits<'a>(block: impl Iterator<Item = &'a Gaussian> + Clone) -> bool {
     error > COARSE * size
 }
 
-/// Returns the sum of the squared errors of all means but those of strays, weighted by squared opacity. A Gaussian that is off by more than its
-/// size looks no worse.
+/// Returns an order with strays and groups in blocks of their own if blocks lose precision and that order reduces the
+/// error; otherwise the given order.
+pub(super) fn set_apart(gaussians: &[Gaussian], order: Vec<u32>) -> Vec<u32> {
+    let at = |&index: &u32| &gaussians[index as usize];
+    if !order.chunks(BLOCK).any(|block| loses_precision(block.iter().map(at))) {
+        return order;
+    }
+    let (near, strays) = separated(gaussians, &order);
+    let mut is_stray = vec![false; gaussians.len()];
+    strays.iter().for_each(|&index| is_stray[index as usize] = true);
+    let apart = arranged(gaussians, &near, strays);
+    let most = gaussians.len() + gaussians.len() / 4 + FILLED * BLOCK;
+    let is_finer = || error(gaussians, &apart, &is_stray) < GAIN * error(gaussians, &order, &is_stray);
+    if apart.len() <= most && is_finer() { apart } else { order }
+}
+
+/// Returns the sum of the squared errors of all means but those of strays, weighted by squared opacity. An error counts
+/// at most as the size of its Gaussian: larger errors look no worse.
 fn error(gaussians: &[Gaussian], order: &[u32], is_stray: &[bool]) -> f64 {
     let of_block = |block: &[u32]| {
         let squared_step = step(block.iter().map(|&index| &gaussians[index as usize])).powi(2);
@@ -103,7 +103,7 @@ fn extent(places: impl Iterator<Item = [f32; 3]>) -> f64 {
     (high - low).max_element().max(0.0)
 }
 
-/// Returns the Gaussians that have neighbors, in Morton order, and the strays.
+/// Returns the Gaussians that are not strays, in Morton order, and the strays.
 fn separated(gaussians: &[Gaussian], order: &[u32]) -> (Vec<u32>, Vec<u32>) {
     let (mut near, mut strays) = (order.to_vec(), Vec::new());
     for _ in 0..ROUNDS {
@@ -125,7 +125,7 @@ fn divided(gaussians: &[Gaussian], order: &[u32]) -> (Vec<u32>, Vec<u32>) {
     let first = groups.iter().position(|(_, group)| group.len() >= FEWEST);
     groups.rotate_left(first.unwrap_or(0));
     for (start, group) in groups {
-        // A group that strays have cut in two goes on behind them.
+        // A group may continue after strays that divide it.
         let ends = near.last().zip(group.first());
         let goes_on = ends.is_some_and(|(&a, &b)| distance(gaussians, a, b) <= gaps[start / BLOCK]);
         let side = if goes_on || group.len() >= FEWEST { &mut near } else { &mut far };
@@ -142,7 +142,7 @@ fn groups<'o>(gaussians: &[Gaussian], order: &'o [u32], gaps: &[f64]) -> Vec<(us
     ends.windows(2).map(|ends| (ends[0], &order[ends[0]..ends[1]])).collect()
 }
 
-/// Returns for each block of an order the distance from which Gaussians that follow each other are not neighbors.
+/// Returns for each block of an order the distance beyond which consecutive Gaussians are not neighbors.
 fn gaps(gaussians: &[Gaussian], order: &[u32]) -> Vec<f64> {
     let size = |window: &[u32]| extent(window.iter().map(|&index| gaussians[index as usize].mean));
     let windows: Vec<f64> = order.chunks(WINDOW).map(size).collect();
@@ -174,7 +174,7 @@ fn arranged(gaussians: &[Gaussian], near: &[u32], strays: Vec<u32>) -> Vec<u32> 
     order
 }
 
-/// Appends Gaussians that begin a block: the block before is filled up with its last Gaussian.
+/// Appends Gaussians from the beginning of a block on: the block before is filled with copies of its last Gaussian.
 fn append(order: &mut Vec<u32>, group: &[u32]) {
     if let Some(&last) = order.last() {
         order.resize(order.len().next_multiple_of(BLOCK), last);
@@ -182,7 +182,7 @@ fn append(order: &mut Vec<u32>, group: &[u32]) {
     order.extend(group);
 }
 
-/// Returns strays of similar distances from the core of the others together, the nearest first.
+/// Returns the strays in shells of similar distances from the core of the other Gaussians, the nearest first.
 fn shells(gaussians: &[Gaussian], near: &[u32], strays: Vec<u32>) -> Vec<Vec<u32>> {
     let mean = |&index: &u32| gaussians[index as usize].mean;
     let around: &[u32] = if near.is_empty() { &strays } else { near };
@@ -232,7 +232,8 @@ mod tests {
         (0..count).map(|_| gaussian(direction() * distance)).collect()
     }
 
-    /// Returns the largest box of a block, after checking that the order has every Gaussian once, and fillers.
+    /// Returns the longest side of the box of each block, after checking that the order has every Gaussian once,
+    /// besides fillers.
     fn largest_boxes(gaussians: &[Gaussian], order: &[u32]) -> Vec<f64> {
         let mut own: Vec<u32> = (0..order.len()).filter(|&at| !is_filler(order, at)).map(|at| order[at]).collect();
         own.sort_unstable();
@@ -251,7 +252,7 @@ mod tests {
         let mut gaussians = cloud(4_000, DVec3::ZERO, &mut random);
         gaussians.extend(cloud(50, DVec3::splat(2.0), &mut random));
         let plain = by_code(&gaussians, (0..4_050).collect());
-        assert_eq!(morton_order(&gaussians), plain, "a few Gaussians beside the others take no digits");
+        assert_eq!(morton_order(&gaussians), plain, "a few Gaussians next to the others cost no precision");
     }
 
     #[test]
