@@ -1,14 +1,16 @@
 //! Wall-clock time of a whole Bevy app's frame, with a playing capture and without a capture.
 //!
 //! ```text
-//! cargo bench --features viewer,cli --bench app -- [CAPTURE] [--size WIDTHxHEIGHT] [--frames N] [--rounds N] [--eye X,Y,Z] [--plugins SET]
+//! cargo bench --features viewer,cli --bench app -- [CAPTURE] [--size WIDTHxHEIGHT] [--frames N] [--rounds N] \
+//!     [--eye X,Y,Z] [--plugins SET]
 //! ```
 //!
-//! In: a capture (default: the bundled capture), a picture size (640x480), the number of frames of a measurement (100), the number of rounds
-//! (21), an eye in capture space that looks at the origin with z up (-3.57,1.3,1.69), and `default` or `minimal` (both). Out: for Bevy's
-//! default plugins and for the minimal plugins that a capture needs, with one sample and with four, without a capture and with each
-//! [`Design`]: frames per second and milliseconds of a frame (median of the rounds), the spread of the rounds, the additional time compared
-//! with the frame without a capture (median of the rounds' differences), and the range of the middle half of these differences. Rendering is
+//! In: a capture (default: the bundled capture), a picture size (640x480), the number of frames of a measurement (100),
+//! the number of rounds (21), an eye in capture space that looks at the origin with z up (-3.57,1.3,1.69), and
+//! `default` or `minimal` (both). Out: for Bevy's default plugins and for the minimal plugins that a capture needs,
+//! with one sample and with four, without a capture and with each [`Design`]: frames per second and milliseconds of a
+//! frame (median of the rounds), the spread of the rounds, the additional time compared with the frame without a
+//! capture (median of the rounds' differences), and the range of the middle half of these differences. Rendering is
 //! pipelined, there is no window, and each measurement ends when the GPU has finished.
 
 mod common;
@@ -29,7 +31,8 @@ use bevy_gs4d::prelude::*;
 use bevy_gs4d::renderer::Design;
 use common::Arguments;
 
-/// A measured app: the set of plugins, the samples of the camera, and the design that draws the capture, `None` without a capture.
+/// A measured app: the set of plugins, the samples of the camera, and the design that draws the capture, `None` without
+/// a capture.
 struct Subject {
     plugins: &'static str,
     samples: u32,
@@ -105,7 +108,8 @@ fn few(plugins: PluginGroupBuilder) -> PluginGroupBuilder {
         .disable::<PostProcessPlugin>()
 }
 
-/// Returns an app with a camera and, if a design is given, a playing capture drawn with that design. All assets are loaded.
+/// Returns an app with a camera and, if a design is given, a playing capture drawn with that design. All assets are
+/// loaded.
 fn app(
     arguments: &Arguments,
     eye: Vec3,

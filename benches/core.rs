@@ -1,6 +1,7 @@
 //! CPU benchmarks: slicing, packages, the CPU reference.
 //!
-//! In: a synthetic scene of 10,000 Gaussians. Out: Criterion's measurements from short runs. `gs4d bench` measures the GPU.
+//! In: a synthetic scene of 10,000 Gaussians. Out: Criterion's measurements from short runs. `gs4d bench` measures the
+//! GPU.
 
 use bevy_gs4d::codec::package::{self, WriteSettings};
 use bevy_gs4d::gaussian::SliceSettings;

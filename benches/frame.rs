@@ -4,9 +4,9 @@
 //! cargo bench --features viewer,cli --bench frame -- [CAPTURE] [FRAMES]
 //! ```
 //!
-//! In: a capture (default: the bundled capture) that plays in front of one camera, a number of frames (default: 600). Out: a
-//! line for each span: entries per frame, median and 95th percentile in microseconds; then the sum over a frame. Bevy's own
-//! systems and the GPU are not included.
+//! In: a capture (default: the bundled capture) that plays in front of one camera, a number of frames (default: 600).
+//! Out: a line for each span: entries per frame, median and 95th percentile in microseconds; then the sum over a frame.
+//! Bevy's own systems and the GPU are not included.
 
 use bevy::log::tracing::span::Id;
 use bevy::log::tracing::subscriber::Interest;

@@ -1,15 +1,18 @@
-//! Wall-clock time of a Bevy app's frame with a capture in a scene: the cost of walls, glass, fog, shadows, cameras and many copies.
+//! Wall-clock time of a Bevy app's frame with a capture in a scene: the cost of walls, glass, fog, shadows, cameras and
+//! many copies.
 //!
 //! ```text
-//! cargo bench --features viewer,cli --bench scene -- [CAPTURE] [--size WIDTHxHEIGHT] [--frames N] [--rounds N] [--only WORD]
+//! cargo bench --features viewer,cli --bench scene -- [CAPTURE] [--size WIDTHxHEIGHT] [--frames N] [--rounds N] \
+//!     [--only WORD]
 //! ```
 //!
-//! In: a capture (default: the bundled capture), a picture size (1280x720), the number of frames of a measurement (100), the number of rounds
-//! (9), a word in the names of the scenes to measure (all scenes). Out: for each scene milliseconds of a frame (median of the rounds), the
-//! spread of the rounds, the additional time compared with the scene that the last column names (median of the rounds' differences), and the
-//! range of the middle half of these differences; then, from the same number of further frames but at most 100, the GPU time of the captures'
-//! passes, all together and (on a line of its own) each, the number of splats, and the GPU memory of all views. Default plugins, no window, pipelined rendering; all apps take turns, and each measurement ends when the
-//! GPU has finished.
+//! In: a capture (default: the bundled capture), a picture size (1280x720), the number of frames of a measurement
+//! (100), the number of rounds (9), a word in the names of the scenes to measure (all scenes). Out: for each scene
+//! milliseconds of a frame (median of the rounds), the spread of the rounds, the additional time compared with the
+//! scene that the last column names (median of the rounds' differences), and the range of the middle half of these
+//! differences; then, from the same number of further frames but at most 100, the GPU time of the captures' passes, all
+//! together and (on a line of its own) each, the number of splats, and the GPU memory of all views. Default plugins, no
+//! window, pipelined rendering; all apps take turns, and each measurement ends when the GPU has finished.
 
 mod common;
 

@@ -1,16 +1,19 @@
-//! Films an island of Bevy's own meshes as a dataset for training: cloth in the wind, petals, a fire, and three kinds of light that cast shadows.
+//! Films an island of Bevy's own meshes as a dataset for training: cloth in the wind, petals, a fire, and three kinds
+//! of light that cast shadows.
 //!
 //! ```text
-//! cargo run --release --features viewer --example film -- [FOLDER] [--rig RIG] [--cameras N] [--times N] [--size SIZE] [--test-at FRACTION]
+//! cargo run --release --features viewer --example film -- [FOLDER] [--rig RIG] [--cameras N] [--times N] \
+//!     [--size SIZE] [--test-at FRACTION]
 //! examples/film/island.sh [FOLDER]
 //! ```
 //!
 //! The script films, trains, bakes and evaluates.
 //!
-//! Defaults: the folder `dataset`, 32 cameras on a hemisphere, each with its own offset of the shutter, 96 times over four seconds, pictures of
-//! 800x800. Every eighth camera is for the test, another eighth for validation. `--rig grid` is a rig as of the dataset N3V: 21 cameras in
-//! three rows before the scene, which film at the same moments, the one in the middle for the test. `--test-at` films the cameras of the test
-//! alone, all at once, so far between each time and the next: 0 at the moments of the first camera, 0.5 halfway between them.
+//! Defaults: the folder `dataset`, 32 cameras on a hemisphere, each with its own offset of the shutter, 96 times over
+//! four seconds, pictures of 800x800. Every eighth camera is for the test, another eighth for validation. `--rig grid`
+//! is a rig as of the dataset N3V: 21 cameras in three rows before the scene, which film at the same moments, the one
+//! in the middle for the test. `--test-at` films the cameras of the test alone, all at once, so far between each time
+//! and the next: 0 at the moments of the first camera, 0.5 halfway between them.
 
 #[path = "film/island.rs"]
 mod island;

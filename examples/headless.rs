@@ -1,7 +1,8 @@
 //! Renders a capture to PNG files without a window or a display: a camera orbits the capture once while it plays once.
 //!
 //! ```text
-//! cargo run --release --features viewer --example headless -- [CAPTURE] [--headless FOLDER] [--frames N] [--size WIDTHxHEIGHT]
+//! cargo run --release --features viewer --example headless -- [CAPTURE] [--headless FOLDER] [--frames N] \
+//!     [--size WIDTHxHEIGHT]
 //! ```
 //!
 //! Defaults: `toybox.gs4d` from `assets/`, `out`, 8 pictures, 640x480. The capture may be a `.gs4d` or a `.pth`.

@@ -4,8 +4,8 @@
 //! cargo run --release --features viewer --example minimal -- [CAPTURE] [--headless FOLDER] [--frames N]
 //! ```
 //!
-//! There are no keys. With `--headless FOLDER`, or without a display, it writes N (8) pictures, a 30th of a second apart, to FOLDER (`out`)
-//! instead.
+//! There are no keys. With `--headless FOLDER`, or without a display, it writes N (8) pictures, a 30th of a second
+//! apart, to FOLDER (`out`) instead.
 
 #[path = "common/arguments.rs"]
 mod arguments;

@@ -1,5 +1,6 @@
-//! Plays a capture in a window, with a lit ball in its middle: the ball hides the splats behind it, and splats in front hide the ball. The
-//! panel on the right plays, crops and tints the capture, shows counts and GPU times, and switches to debug views.
+//! Plays a capture in a window, with a lit ball in its middle: the ball hides the splats behind it, and splats in front
+//! hide the ball. The panel on the right plays, crops and tints the capture, shows counts and GPU times, and switches
+//! to debug views.
 //!
 //! ```text
 //! cargo run --release --features viewer --example play -- [CAPTURE] [--headless FOLDER] [--frames N]
@@ -9,12 +10,14 @@
 //! * click: mark the Gaussian there; the panel names it
 //! * space: play and pause; left and right: one frame back and forward, at the panel's frame rate
 //! * F1: close and open the panel
-//! * drop a capture on the window, a file of any format or the folder of a sequence: play it; if it cannot be read, the panel shows the
-//!   reason
+//! * drop a capture on the window, a file of any format or the folder of a sequence: play it; if it cannot be read, the
+//!   panel shows the reason
 //!
-//! A capture whose file changes is loaded again, so that the output of a running `gs4d train` is shown as it becomes better.
+//! A capture whose file changes is loaded again, so that the output of a running `gs4d train` is shown as it becomes
+//! better.
 //!
-//! With `--headless FOLDER`, or without a display, it writes N (8) pictures to FOLDER (`out`) instead, without the panel.
+//! With `--headless FOLDER`, or without a display, it writes N (8) pictures to FOLDER (`out`) instead, without the
+//! panel.
 
 mod common;
 #[path = "common/controls.rs"]

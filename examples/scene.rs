@@ -1,11 +1,12 @@
-//! A capture among meshes: fog, glass in front of and behind the capture, and a sun for which the capture casts and receives shadows.
+//! A capture among meshes: fog, glass in front of and behind the capture, and a sun for which the capture casts and
+//! receives shadows.
 //!
 //! ```text
 //! cargo run --release --features viewer --example scene -- [CAPTURE] [--headless FOLDER] [--frames N]
 //! ```
 //!
-//! There are no keys. With `--headless FOLDER`, or without a display, it writes N (8) pictures, a 30th of a second apart, to FOLDER (`out`)
-//! instead.
+//! There are no keys. With `--headless FOLDER`, or without a display, it writes N (8) pictures, a 30th of a second
+//! apart, to FOLDER (`out`) instead.
 
 #[path = "common/arguments.rs"]
 mod arguments;

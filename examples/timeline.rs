@@ -1,17 +1,18 @@
-//! One capture twice and a flying ball, directed by a timeline: `assets/demo.timeline.ron` defines when captures play, fade and reverse,
-//! and the ball's animation follows the same playhead. The file is reloaded when it changes.
+//! One capture twice and a flying ball, directed by a timeline: `assets/demo.timeline.ron` defines when captures play,
+//! fade and reverse, and the ball's animation follows the same playhead. The file is reloaded when it changes.
 //!
 //! ```text
 //! cargo run --release --features viewer --example timeline -- [TIMELINE] [--headless FOLDER] [--frames N]
 //! ```
 //!
-//! * click or drag in the panel below: scrub. Bars are clips (red: backwards), their cut corners are fades, short marks are key-frames of
-//!   captures and of the ball's animation, and flags are markers
-//! * space: play and pause; left and right: a 30th of a second back and forward; R: reverse; Home: to the start. The panel has buttons for
-//!   the same actions
+//! * click or drag in the panel below: scrub. Bars are clips (red: backwards), their cut corners are fades, short marks
+//!   are key-frames of captures and of the ball's animation, and flags are markers
+//! * space: play and pause; left and right: a 30th of a second back and forward; R: reverse; Home: to the start. The
+//!   panel has buttons for the same actions
 //! * drag elsewhere with the left button: orbit; wheel: nearer and farther
 //!
-//! With `--headless FOLDER`, or without a display, it writes N (8) pictures, a 30th of a second apart, to FOLDER (`out`) instead.
+//! With `--headless FOLDER`, or without a display, it writes N (8) pictures, a 30th of a second apart, to FOLDER
+//! (`out`) instead.
 
 #[path = "timeline/chart.rs"]
 mod chart;
@@ -101,7 +102,8 @@ fn setup(mut commands: Commands, assets: Res<AssetServer>, show: Res<Show>) {
     ));
     commands.spawn((
         Camera3d::default(),
-        // Captures need no multisampling. With multisampling, opaque meshes such as the ball would hide captures per sample.
+        // Captures need no multisampling. With multisampling, opaque meshes such as the ball would hide captures per
+        // sample.
         Msaa::Off,
         // Captures keep their trained colors.
         Tonemapping::None,

@@ -1,5 +1,5 @@
-//! Walks around a capture as in virtual reality: both eyes side by side, a body that walks and teleports, and a vignette that closes while
-//! the body moves, against motion sickness.
+//! Walks around a capture as in virtual reality: both eyes side by side, a body that walks and teleports, and a
+//! vignette that closes while the body moves, against motion sickness.
 //!
 //! ```text
 //! cargo run --release --features viewer --example walkthrough -- \
@@ -11,14 +11,16 @@
 //! * V: vignette on and off; I: next distance between the eyes (64, 70, 0 and 58 mm)
 //! * P: follow the recorded path, or stop; R: start recording a path; R again: write it to `recorded.path.ron`
 //!
-//! `--path FILE` follows the path in a file from the start; without it, P follows the path in `assets/walkthrough.path.ron`. With
-//! `--two-targets` each eye draws into its own target, and the window shows only the left eye.
+//! `--path FILE` follows the path in a file from the start; without it, P follows the path in
+//! `assets/walkthrough.path.ron`. With `--two-targets` each eye draws into its own target, and the window shows only
+//! the left eye.
 //!
-//! With `--headless FOLDER`, or without a display, it follows the recorded path and writes N (8) pictures, a 30th of a second apart, to
-//! FOLDER (`out`) instead: both eyes in one picture, or with `--two-targets` two pictures for each time.
+//! With `--headless FOLDER`, or without a display, it follows the recorded path and writes N (8) pictures, a 30th of a
+//! second apart, to FOLDER (`out`) instead: both eyes in one picture, or with `--two-targets` two pictures for each
+//! time.
 //!
-//! Built with the feature `openxr`, it draws for a headset, which has not been tested: the headset tracks the head, and keys and mouse move
-//! the body. Without a headset it prints a message and shows the window.
+//! Built with the feature `openxr`, it draws for a headset, which has not been tested: the headset tracks the head, and
+//! keys and mouse move the body. Without a headset it prints a message and shows the window.
 
 #[path = "common/arguments.rs"]
 mod arguments;

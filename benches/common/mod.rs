@@ -1,7 +1,8 @@
-//! Common code of the benchmarks that measure whole apps: the command line, apps that run like games, and the rounds of measurements.
+//! Common code of the benchmarks that measure whole apps: the command line, apps that run like games, and the rounds of
+//! measurements.
 //!
-//! In: `[CAPTURE] [--size WIDTHxHEIGHT] [--frames N] [--rounds N]` and the options of one benchmark; apps. Out: [`Arguments`], and the
-//! [`Times`] of each app's frame.
+//! In: `[CAPTURE] [--size WIDTHxHEIGHT] [--frames N] [--rounds N]` and the options of one benchmark; apps. Out:
+//! [`Arguments`], and the [`Times`] of each app's frame.
 
 use bevy::app::PluginGroupBuilder;
 use bevy::log::LogPlugin;
@@ -30,8 +31,9 @@ pub struct Arguments {
 /// Milliseconds of an app's frame, one for each round.
 pub struct Times(Vec<f64>);
 
-/// Parses the command line; `size`, `frames` and `rounds` are defaults. `more` is called with each option that is not common to all benchmarks
-/// and with a function that returns the option's value; it returns whether this benchmark has the option.
+/// Parses the command line; `size`, `frames` and `rounds` are defaults. `more` is called with each option that is not
+/// common to all benchmarks and with a function that returns the option's value; it returns whether this benchmark has
+/// the option.
 ///
 /// # Errors
 /// An unknown option, an option without a value or with an invalid value.
@@ -69,7 +71,8 @@ pub fn numbers<T: std::str::FromStr, const N: usize>(text: &str, separator: char
     parts.try_into().ok()
 }
 
-/// Returns an app without a window, with pipelined rendering. Bevy has one logger for all apps: `logged` is whether it is already installed.
+/// Returns an app without a window, with pipelined rendering. Bevy has one logger for all apps: `logged` is whether it
+/// is already installed.
 pub fn app(size: UVec2, logged: bool, adjust: impl FnOnce(PluginGroupBuilder) -> PluginGroupBuilder) -> App {
     testing::app_with(size, |plugins| {
         let plugins = adjust(plugins).enable::<PipelinedRenderingPlugin>();
@@ -77,7 +80,8 @@ pub fn app(size: UVec2, logged: bool, adjust: impl FnOnce(PluginGroupBuilder) ->
     })
 }
 
-/// Waits until all assets are loaded. Afterwards each update advances time by a 60th of a second, independent of its wall-clock time.
+/// Waits until all assets are loaded. Afterwards each update advances time by a 60th of a second, independent of its
+/// wall-clock time.
 ///
 /// # Errors
 /// The errors of [`testing::settle`].
@@ -119,8 +123,9 @@ impl Times {
         format!("{low:.3} - {high:.3}")
     }
 
-    /// Returns the additional frame time compared with another app that took turns with this app: the median of the rounds' differences, and
-    /// the range of the middle half of the differences, as text. A temporary slowdown of the machine affects both apps of a round.
+    /// Returns the additional frame time compared with another app that took turns with this app: the median of the
+    /// rounds' differences, and the range of the middle half of the differences, as text. A temporary slowdown of the
+    /// machine affects both apps of a round.
     pub fn more_than(&self, other: &Self) -> (f64, String) {
         let [low, median, high] = quartiles(self.0.iter().zip(&other.0).map(|(own, other)| own - other).collect());
         (median, format!("{low:.3} - {high:.3}"))

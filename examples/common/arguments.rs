@@ -1,7 +1,7 @@
 //! The command line of every example, and pictures without a window.
 //!
-//! In: `[FILE] [--headless FOLDER] [--frames N] [--help]` and the options of one example. Out: [`Arguments`], an asset path, pictures in
-//! a folder.
+//! In: `[FILE] [--headless FOLDER] [--frames N] [--help]` and the options of one example. Out: [`Arguments`], an asset
+//! path, pictures in a folder.
 
 use bevy::asset::io::file::FileAssetReader;
 use bevy::prelude::*;
@@ -21,8 +21,9 @@ pub struct Arguments {
     pub frames: u32,
 }
 
-/// Reads the command line. `more` is called with each option that is not common to all examples and with the following arguments; it
-/// returns whether the option belongs to this example. Without a display, pictures are written even without `--headless`.
+/// Reads the command line. `more` is called with each option that is not common to all examples and with the following
+/// arguments; it returns whether the option belongs to this example. Without a display, pictures are written even
+/// without `--headless`.
 ///
 /// # Errors
 /// An unknown option, an option without its value, more than one file.
@@ -85,8 +86,8 @@ fn has_display() -> bool {
     !cfg!(target_os = "linux") || std::env::var_os("DISPLAY").is_some_and(|display| !display.is_empty())
 }
 
-/// Returns a path from the command line as an asset path: relative to `assets/` if there is such a file there and none in the current folder, else to the
-/// current folder, where it may appear later.
+/// Returns a path from the command line as an asset path: relative to `assets/` if there is such a file there and none
+/// in the current folder, else to the current folder, where it may appear later.
 pub fn asset_path(argument: &str) -> PathBuf {
     let path = Path::new(argument);
     let is_asset = FileAssetReader::get_base_path().join("assets").join(path).exists();

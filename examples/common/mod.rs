@@ -31,7 +31,8 @@ impl Orbit {
         Self { center: capture.upright() * center, distance: 2.2 * radius, yaw: 0.6, pitch: 0.3 }
     }
 
-    /// Moves a camera to its position on the orbit. Bevy's near plane would hide captures of some centimeters: it is closer there.
+    /// Moves a camera to its position on the orbit. Bevy's near plane would hide captures of some centimeters: it is
+    /// closer there.
     pub fn place(&self, transform: &mut Transform, projection: &mut Projection) {
         *transform = self.transform();
         if let Projection::Perspective(lens) = projection {

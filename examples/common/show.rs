@@ -1,7 +1,7 @@
 //! Shared by the examples without keys: runs an app with a window, or an app without a window that writes pictures.
 //!
-//! In: the command line `[CAPTURE] [--headless FOLDER] [--frames N]`, the plugins and systems of an example. Out: a window until it is
-//! closed, or pictures in a folder.
+//! In: the command line `[CAPTURE] [--headless FOLDER] [--frames N]`, the plugins and systems of an example. Out: a
+//! window until it is closed, or pictures in a folder.
 
 use crate::arguments::{Arguments, asset_path, parse, save_pictures};
 use bevy::asset::UnapprovedPathMode;
@@ -10,8 +10,8 @@ use bevy_gs4d::testing;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Runs an app with Bevy's default plugins. `size` is the size of pictures; `build` adds the plugins and systems of the example, given the
-/// asset path of the capture on the command line.
+/// Runs an app with Bevy's default plugins. `size` is the size of pictures; `build` adds the plugins and systems of the
+/// example, given the asset path of the capture on the command line.
 ///
 /// # Errors
 /// Those of [`parse`] and [`save_pictures`].

@@ -1,7 +1,8 @@
-//! The scene of the example `film`: a floating island with a cherry tree that sheds petals, a gate with paper lanterns, carp streamers in the
-//! wind and a fire.
+//! The scene of the example `film`: a floating island with a cherry tree that sheds petals, a gate with paper lanterns,
+//! carp streamers in the wind and a fire.
 //!
-//! In: a time in seconds. Out: the pose and shape of everything that moves. The scene is a loop of [`SECONDS`] and depends on the time alone.
+//! In: a time in seconds. Out: the pose and shape of everything that moves. The scene is a loop of [`SECONDS`] and
+//! depends on the time alone.
 
 use bevy::asset::RenderAssetUsages;
 use bevy::camera::visibility::NoFrustumCulling;

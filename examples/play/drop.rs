@@ -4,8 +4,7 @@
 
 use bevy::prelude::*;
 use bevy_gs4d::GaussianCapture3d;
-use bevy_gs4d::asset::GaussianCapture;
-use bevy_gs4d::codec::ReadOptions;
+use bevy_gs4d::asset::{CaptureLoaderSettings, GaussianCapture};
 use bevy_gs4d::playback::Playback;
 use std::path::Path;
 
@@ -18,7 +17,8 @@ pub fn load(assets: &AssetServer, path: &Path) -> Handle<GaussianCapture> {
     let first = files.filter(|file| file.extension().is_some_and(|extension| extension == "ply")).min();
     match first {
         Some(first) => {
-            assets.load_builder().with_settings(|options: &mut ReadOptions| options.sequence = true).load(first)
+            let settings = |settings: &mut CaptureLoaderSettings| settings.read.sequence = true;
+            assets.load_builder().with_settings(settings).load(first)
         }
         None => assets.load(path.join("meta.json")),
     }

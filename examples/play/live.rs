@@ -1,7 +1,8 @@
 //! Captures whose file changes while the example `play` shows them, such as the output of `gs4d train`.
 //!
-//! In: the capture of the app, the size and the time of change of its file. Out: the capture, loaded again after each change. Bevy's own watcher
-//! sees files in `assets/` alone, and not those that a complete file replaces under its name, as `gs4d` does.
+//! In: the capture of the app, the size and the time of change of its file. Out: the capture, loaded again after each
+//! change. Bevy's own watcher sees files in `assets/` alone, and not those that a complete file replaces under its
+//! name, as `gs4d` does.
 
 use bevy::asset::io::file::FileAssetReader;
 use bevy::prelude::*;
@@ -13,7 +14,8 @@ use std::time::SystemTime;
 /// What changes with the contents of a file.
 type Stamp = (u64, Option<SystemTime>);
 
-/// Loads the capture again if its file has changed since the last look, or has appeared. A file that is missing for a moment is not a change.
+/// Loads the capture again if its file has changed since the last look, or has appeared. A file that is missing for a
+/// moment is not a change.
 pub fn reload_changed(
     assets: Res<AssetServer>,
     capture: Single<&GaussianCapture3d>,

@@ -1,7 +1,7 @@
 //! The chart of a timeline: its clips, key-frames, markers and playhead.
 //!
-//! In: a timeline, its captures, the key-frames of an animation. Out: bars, marks and flags in an egui panel, and the time under the
-//! pointer.
+//! In: a timeline, its captures, the key-frames of an animation. Out: bars, marks and flags in an egui panel, and the
+//! time under the pointer.
 
 use bevy::prelude::*;
 use bevy_egui::egui::{Align2, Color32, FontId, Painter, Rect, Sense, Shape, Stroke, Ui, pos2, vec2};

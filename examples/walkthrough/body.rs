@@ -18,7 +18,8 @@ const EAGERNESS: f32 = 8.0;
 /// Rotation per motion of the mouse, in radians per pixel.
 const SENSITIVITY: f32 = 0.004;
 
-/// The body: it stands on the floor and turns only about the vertical. With a headset, it is the tracking space of the head.
+/// The body: it stands on the floor and turns only about the vertical. With a headset, it is the tracking space of the
+/// head.
 #[derive(Component, Default)]
 pub struct Body {
     velocity: Vec3,

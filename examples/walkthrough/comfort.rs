@@ -200,8 +200,8 @@ mod tests {
         assert_eq!(motion(before, (Vec3::ZERO, FRAC_PI_6), FRAME), 0.0, "a snap turn is a jump");
     }
 
-    /// Returns whether the ring is visible, and its size relative to its distance, after the body has moved `step` meters in each of
-    /// `frames` frames.
+    /// Returns whether the ring is visible, and its size relative to its distance, after the body has moved `step`
+    /// meters in each of `frames` frames.
     fn walk(app: &mut App, step: f32, frames: usize) -> (bool, f32) {
         for _ in 0..frames {
             let mut body = app.world_mut().query_filtered::<&mut Transform, With<Body>>();

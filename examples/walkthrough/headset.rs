@@ -1,7 +1,7 @@
 //! A headset, with the feature `openxr`.
 //!
-//! In: an app without plugins, and Bevy's plugins. Out: the app with these plugins and, if there is a headset, a tracked body and the eyes
-//! of the headset.
+//! In: an app without plugins, and Bevy's plugins. Out: the app with these plugins and, if there is a headset, a
+//! tracked body and the eyes of the headset.
 
 use bevy::app::PluginGroupBuilder;
 use bevy::prelude::*;

@@ -87,8 +87,8 @@ impl HeadPath {
         self.0.last().map_or(0.0, |pose| pose.time)
     }
 
-    /// Returns the pose at a time, on a smooth curve through the poses. The curve starts and ends at rest, and is constant before and
-    /// after.
+    /// Returns the pose at a time, on a smooth curve through the poses. The curve starts and ends at rest, and is
+    /// constant before and after.
     fn at(&self, seconds: f32) -> Pose {
         let Some(last) = self.0.len().checked_sub(1).filter(|last| *last > 0) else { return self.0[0] };
         let next = self.0.partition_point(|pose| pose.time <= seconds).clamp(1, last);

@@ -1,6 +1,8 @@
-//! Teleporting: the key is held to aim at the floor along a ballistic curve and released to teleport, during a fade to black.
+//! Teleporting: the key is held to aim at the floor along a ballistic curve and released to teleport, during a fade to
+//! black.
 //!
-//! In: the pose of the head, keys and buttons. Out: a new position of the body, the darkness of the view, and dots that show the aim.
+//! In: the pose of the head, keys and buttons. Out: a new position of the body, the darkness of the view, and dots that
+//! show the aim.
 
 use super::body::{Body, Head, Moves};
 use super::path::{follow, walking};
@@ -102,8 +104,8 @@ pub fn setup(
     }
 }
 
-/// Adds aiming by keys and the teleport. Aiming is disabled while a recorded path is followed, but a teleport that has started is
-/// completed, since the view would otherwise stay dark.
+/// Adds aiming by keys and the teleport. Aiming is disabled while a recorded path is followed, but a teleport that has
+/// started is completed, since the view would otherwise stay dark.
 pub fn plugin(app: &mut App) {
     app.add_systems(Update, (aim.run_if(walking), travel).chain().before(follow).in_set(Moves))
         .add_systems(Update, show.after(Moves));

@@ -1,7 +1,8 @@
 //! Captures in Bevy apps without a window: pixels, transforms, viewports and time.
 //!
-//! In: small scenes made by hand. Out: proof that Bevy's pixels equal the CPU reference, that meshes hide the splats behind them, and that
-//! transforms, viewports, multisampling and time have their documented effect. Skipped without a GPU; a software driver is enough.
+//! In: small scenes made by hand. Out: proof that Bevy's pixels equal the CPU reference, that meshes hide the splats
+//! behind them, and that transforms, viewports, multisampling and time have their documented effect. Skipped without a
+//! GPU; a software driver is enough.
 
 use crate::support::cpu_reference::{DURATION, SIZE, difference, difference_between, eye, rgb, view, view_of};
 use crate::support::fixtures::{self, BLACK, lone, spawn, spawn_flat_box};
@@ -260,7 +261,7 @@ fn a_package_loads_from_a_folder_and_a_broken_one_is_an_error() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let (good, broken) = (folder.path().join("crowd.gs4d"), folder.path().join("broken.gs4d"));
     let scene = crowd();
-    offline::save(&good, &GaussianScene::from(scene.clone()), &codec::package::WriteSettings::default())
+    offline::work::save(&good, &GaussianScene::from(scene.clone()), &codec::package::WriteSettings::default())
         .expect("saved");
     let mut bytes = std::fs::read(&good).expect("just written");
     let last = bytes.len() - 1;

@@ -14,10 +14,9 @@ use bevy::asset::{AssetLoadError, AssetLoadFailedEvent, AssetTrackingSystems, Lo
 use bevy::prelude::*;
 use bevy::tasks::block_on;
 use bevy_gs4d::asset::{
-    CaptureAssetSystems, CaptureFailed, CaptureReady, CaptureSaveError, CaptureState, GaussianCapture, PackageSaver,
-    PackageSaverSettings,
+    CaptureAssetSystems, CaptureFailed, CaptureLoaderSettings, CaptureReady, CaptureSaveError, CaptureState,
+    GaussianCapture, PackageSaver, PackageSaverSettings,
 };
-use bevy_gs4d::codec::ReadOptions;
 use bevy_gs4d::codec::package::WriteSettings;
 use bevy_gs4d::offline;
 use bevy_gs4d::prelude::Upright;
@@ -65,8 +64,8 @@ fn reload(app: &App, name: &'static str) {
     app.world().resource::<AssetServer>().reload(name);
 }
 
-/// Reloads a file that fails, until Bevy has made all `times` attempts: one for a missing file, two for a broken file. A later attempt
-/// could otherwise read the file that a test writes next.
+/// Reloads a file that fails, until Bevy has made all `times` attempts: one for a missing file, two for a broken file.
+/// A later attempt could otherwise read the file that a test writes next.
 fn attempt(app: &mut App, name: &'static str, times: usize) {
     let failures = |app: &App| app.world().resource::<Failures>().0;
     let enough = failures(app) + times;
@@ -116,7 +115,7 @@ fn folder() -> TempDir {
 }
 
 fn write(folder: &Path, name: &str, count: usize) {
-    offline::save(&folder.join(name), &synthetic(count), &WriteSettings { level: 1 })
+    offline::work::save(&folder.join(name), &synthetic(count), &WriteSettings { level: 1 })
         .expect("the folder can be written to");
 }
 
@@ -154,7 +153,8 @@ struct Gated {
 
 impl AssetReader for Gated {
     async fn read<'a>(&'a self, path: &'a Path) -> Result<impl Reader + 'a, AssetReaderError> {
-        // A read on the main thread would wait until the timeout and fail the test. A failed test drops the sender, which opens the gate.
+        // A read on the main thread would wait until the timeout and fail the test. A failed test drops the sender,
+        // which opens the gate.
         let _ = self.gate.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(LOAD_TIMEOUT);
         self.files.read(path).await
     }
@@ -203,7 +203,7 @@ fn failures_name_the_file_and_the_remedy() {
     for (name, fault, kind) in [
         ("missing.gs4d", "check the name", "NotFound"),
         ("broken.gs4d", "copy or download it again", "Invalid"),
-        ("text.pth", "copy the file again", "Invalid"),
+        ("text.pth", "it is text that begins with epoch 30000", "Invalid"),
     ] {
         let capture = load(&app, name);
         let entity = spawn(&mut app, &capture);
@@ -251,7 +251,8 @@ fn a_failure_is_sent_while_the_server_loads_again() {
     /// The sender that opens the gate, until it has been used.
     #[derive(Resource)]
     struct Gate(Option<mpsc::Sender<()>>);
-    /// Runs after the server has received a failure and before the states are updated: lets Bevy's second attempt begin.
+    /// Runs after the server has received a failure and before the states are updated: lets Bevy's second attempt
+    /// begin.
     fn begin_again(server: Res<AssetServer>, mut gate: ResMut<Gate>, captures: Query<&GaussianCapture3d>) {
         let state = || captures.iter().find_map(|capture| server.get_load_state(capture.0.id()));
         if let Some(LoadState::Failed(error)) = state()
@@ -433,7 +434,7 @@ fn settings_override_cfg_args_and_cfg_args_override_defaults() {
     let folder = checkpoints();
     let mut app = app(folder.path(), false);
     let server = app.world().resource::<AssetServer>().clone();
-    let settings = |options: &mut ReadOptions| options.background = Some([0.25; 3]);
+    let settings = |settings: &mut CaptureLoaderSettings| settings.read.background = Some([0.25; 3]);
     let captures: [Handle<GaussianCapture>; 3] = [
         server.load("without/a.pth"),
         server.load("with/a.pth"),

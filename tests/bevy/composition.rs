@@ -1,8 +1,8 @@
 //! Captures in a Bevy frame with meshes and cameras: appearance, visibility, depth, color.
 //!
-//! In: small scenes made by hand, in headless apps. Out: proof that opacity, light, crop and blend spaces match the CPU reference, that
-//! every camera draws the captures of its layers from its own pose, and that captures and meshes hide each other in the documented order.
-//! Skipped without a GPU; a software driver is enough.
+//! In: small scenes made by hand, in headless apps. Out: proof that opacity, light, crop and blend spaces match the CPU
+//! reference, that every camera draws the captures of its layers from its own pose, and that captures and meshes hide
+//! each other in the documented order. Skipped without a GPU; a software driver is enough.
 
 use crate::support::blob::blob;
 use crate::support::cpu_reference::{

@@ -1,8 +1,9 @@
 //! Captures that are small on the screen, in headless apps: levels of detail and anti-aliasing.
 //!
-//! In: a capture with levels made by hand, and the bundled capture, far away and near. Out: proof that the level follows the size on the
-//! screen without flicker, that settings limit the level, that the bundled capture's levels reach 45 dB, that captures without levels are
-//! drawn whole, and that anti-aliasing matches the CPU reference. Skipped without a GPU.
+//! In: a capture with levels made by hand, and the bundled capture, far away and near. Out: proof that the level
+//! follows the size on the screen without flicker, that settings limit the level, that the bundled capture's levels
+//! reach 45 dB, that captures without levels are drawn whole, and that anti-aliasing matches the CPU reference. Skipped
+//! without a GPU.
 
 use crate::support::blob::blob;
 use crate::support::cpu_reference::{SIZE, add, scene, view};
@@ -59,8 +60,8 @@ impl Stage {
     }
 }
 
-/// Returns the distance at which a heap has this size in pixels: a box of three standard deviations of 0.3 has a sphere of radius 1.56, and
-/// the height of 150 pixels is 0.8 radians.
+/// Returns the distance at which a heap has this size in pixels: a box of three standard deviations of 0.3 has a sphere
+/// of radius 1.56, and the height of 150 pixels is 0.8 radians.
 fn distance_of(pixels: f32) -> f32 {
     let (radius, focal) = (0.9 * 3f32.sqrt(), 75.0 / 0.4f32.tan());
     radius * (1.0 + (2.0 * focal / pixels).powi(2)).sqrt()

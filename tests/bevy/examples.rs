@@ -1,8 +1,8 @@
 //! The examples as programs: the pictures that they write without a window, and their errors for wrong arguments.
 //!
-//! In: the examples that `cargo test` has built with the tests. Out: proof that each example exits with success and writes the requested
-//! number of pictures, that the pictures show captures, and that the captures move. Tests that draw are skipped without a GPU; a software
-//! driver is enough.
+//! In: the examples that `cargo test` has built with the tests. Out: proof that each example exits with success and
+//! writes the requested number of pictures, that the pictures show captures, and that the captures move. Tests that
+//! draw are skipped without a GPU; a software driver is enough.
 
 use crate::support::no_gpu::no_gpu;
 use bevy_gs4d::codec::package::WriteSettings;
@@ -44,7 +44,8 @@ fn run_with(root: &Path, example: &str, arguments: &[&str]) -> Output {
     command.output().unwrap_or_else(|error| panic!("{example} can be started: {error}"))
 }
 
-/// Returns the pictures of `frames` times that an example writes without a window, in order of their names; `None` if there is no GPU.
+/// Returns the pictures of `frames` times that an example writes without a window, in order of their names; `None` if
+/// there is no GPU.
 fn pictures(root: &Path, example: &str, options: &[&str], frames: usize) -> Option<Vec<RgbaImage>> {
     if !has_gpu() {
         no_gpu();
@@ -127,7 +128,8 @@ fn headless_writes_pictures() {
     check("headless", &["--size", "200x120"], 2);
 }
 
-/// Returns a folder with the assets of the crate, except that the captures are fully transparent. Their durations and bounds are unchanged.
+/// Returns a folder with the assets of the crate, except that the captures are fully transparent. Their durations and
+/// bounds are unchanged.
 fn invisible() -> TempDir {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let (from, to) = (Path::new(ROOT).join("assets"), folder.path().join("assets"));
@@ -140,7 +142,7 @@ fn invisible() -> TempDir {
             gaussian.opacity = 0.0;
         }
         let scene = GaussianScene::from(scene);
-        offline::save(&to.join(name), &scene, &WriteSettings { level: 1 }).expect("the folder can be written to");
+        offline::work::save(&to.join(name), &scene, &WriteSettings { level: 1 }).expect("the folder can be written to");
     }
     folder
 }

@@ -1,52 +1,40 @@
 //! Failures of the GPU in running apps: limits, refused objects and refused pipelines.
 //!
-//! In: devices with lowered limits or without a feature, and captures that they cannot draw. Out: proof that the app goes on, that the failure
-//! is reported with its entity, and that captures drawn before are still drawn. Skipped without a GPU; a software driver is enough.
+//! In: devices with lowered limits or without a feature, and captures that they cannot draw. Out: proof that the app
+//! goes on, that the failure is reported with its entity, and that captures drawn before are still drawn. Skipped
+//! without a GPU; a software driver is enough.
 
 use crate::support::blob::blob;
 use crate::support::cpu_reference::scene;
+use crate::support::event_log::failures_of;
 use crate::support::fixtures::{front, synthetic};
-use crate::support::offscreen_app::{app, spawn_camera};
+use crate::support::limited_app::limited_app;
+use crate::support::offscreen_app::{app, run_frames, spawn_camera};
 use bevy::prelude::*;
+use bevy::render::RenderApp;
 use bevy::render::render_resource::{
     BlendState, ColorTargetState, ColorWrites, FragmentState, PipelineCache, RenderPipelineDescriptor,
     SpecializedRenderPipeline, TextureFormat,
 };
 use bevy::render::renderer::RenderDevice;
-use bevy::render::settings::{Backends, RenderCreation, WgpuLimits, WgpuSettings};
-use bevy::render::{RenderApp, RenderPlugin};
+use bevy::render::settings::{WgpuLimits, WgpuSettings};
+use bevy_gs4d::GaussianCapture3d;
 use bevy_gs4d::asset::{CaptureFailed, CaptureFailure, CaptureState, GaussianCapture};
 use bevy_gs4d::internal::plugin::CheckedPipelines;
 use bevy_gs4d::playback::Playback;
 use bevy_gs4d::render::CaptureStatistics;
 use bevy_gs4d::scene::RuntimeScene;
 use bevy_gs4d::testing::{self, Offscreen};
-use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugins};
 use image::RgbaImage;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Mutex, PoisonError};
 
 const SIZE: UVec2 = UVec2::new(64, 48);
 /// Largest storage buffer binding of a limited device, bytes: the splats of less than 44,000 Gaussians.
 const BINDING: u64 = 1 << 21;
 
-/// Returns an app whose device is changed by `adjust`, which receives the limits of this GPU, and a camera in front of the origin; without a
-/// GPU, reports the skipped test and returns `None`.
-fn limited_app(adjust: impl FnOnce(&mut WgpuSettings, WgpuLimits)) -> Option<(App, Entity)> {
-    let mut plain = app(SIZE)?;
-    testing::settle(&mut plain).expect("the app draws without an error");
-    let limits = plain.sub_app(RenderApp).world().resource::<RenderDevice>().limits();
-    drop(plain);
-    let backends = if cfg!(target_os = "linux") { Backends::VULKAN } else { Backends::PRIMARY };
-    let mut settings = WgpuSettings { backends: Some(backends), ..default() };
-    adjust(&mut settings, limits);
-    let mut app = testing::app_with(SIZE, |plugins| {
-        plugins.set(RenderPlugin {
-            render_creation: RenderCreation::Automatic(Box::new(settings)),
-            synchronous_pipeline_compilation: true,
-            ..default()
-        })
-    });
-    app.add_plugins(GaussianCapturePlugins).insert_resource(ClearColor(Color::BLACK));
+/// Returns an app with a limited device, and a camera in front of the origin.
+fn limited(adjust: impl FnOnce(&mut WgpuSettings, WgpuLimits)) -> Option<(App, Entity)> {
+    let mut app = limited_app(SIZE, adjust)?;
     let camera = spawn_camera(&mut app, Msaa::Off, front());
     testing::settle(&mut app).expect("an app without captures draws without an error");
     Some((app, camera))
@@ -54,7 +42,7 @@ fn limited_app(adjust: impl FnOnce(&mut WgpuSettings, WgpuLimits)) -> Option<(Ap
 
 /// Returns an app with storage buffer bindings of at most [`BINDING`] bytes.
 fn app_with_small_bindings() -> Option<(App, Entity)> {
-    limited_app(|settings, limits| {
+    limited(|settings, limits| {
         let limits = WgpuLimits { max_storage_buffer_binding_size: BINDING, ..limits };
         settings.constrained_limits = Some(limits);
     })
@@ -70,28 +58,10 @@ fn red() -> RuntimeScene {
     scene(&[(blob(Vec3::ZERO, Vec3::splat(0.4), 0.98), Vec3::X)])
 }
 
-/// Collects the failures of captures from now on.
-fn failures_of(app: &mut App) -> Arc<Mutex<Vec<CaptureFailed>>> {
-    let failures = Arc::new(Mutex::new(Vec::new()));
-    let sink = failures.clone();
-    app.add_observer(move |failure: On<CaptureFailed>| {
-        sink.lock().unwrap_or_else(PoisonError::into_inner).push(failure.event().clone());
-    });
-    failures
-}
-
 /// Returns the failures of an entity.
 fn about(failures: &Mutex<Vec<CaptureFailed>>, entity: Entity) -> Vec<String> {
     let failures = failures.lock().unwrap_or_else(PoisonError::into_inner);
     failures.iter().filter(|failure| failure.entity == entity).map(|failure| failure.error.to_string()).collect()
-}
-
-/// Runs frames.
-fn run(app: &mut App, frames: usize) {
-    for frame in 0..frames {
-        app.update();
-        assert!(app.should_exit().is_none(), "the app goes on in frame {frame}; the log has the reason of its end");
-    }
 }
 
 fn read(app: &mut App) -> RgbaImage {
@@ -112,7 +82,7 @@ fn a_capture_too_large_for_any_view_fails_and_the_old_capture_is_drawn() {
     testing::settle(&mut app).expect("the app draws without an error");
     assert!(is_red_in_the_middle(&read(&mut app)), "the first capture is drawn");
     let large = spawn(&mut app, synthetic(60_000, 1, false));
-    run(&mut app, 10);
+    run_frames(&mut app, 10);
     let said = about(&failures, large);
     assert!(
         matches!(&said[..], [one] if one.contains("the splats") && one.contains("draw fewer Gaussians")),
@@ -126,7 +96,7 @@ fn a_capture_too_large_for_any_view_fails_and_the_old_capture_is_drawn() {
     let id = app.world().get::<GaussianCapture3d>(old).expect("still there").0.id();
     let changed = GaussianCapture::new(synthetic(60_000, 2, false));
     app.world_mut().resource_mut::<Assets<GaussianCapture>>().insert(id, changed).expect("a used identifier");
-    run(&mut app, 10);
+    run_frames(&mut app, 10);
     assert_eq!(about(&failures, old).len(), 1, "one failure of the changed capture is sent");
     assert!(is_red_in_the_middle(&read(&mut app)), "its old version is still drawn");
 }
@@ -141,31 +111,31 @@ fn captures_without_room_in_a_view_leave_the_earlier_captures_drawn() {
     assert!(before.pixels().any(|pixel| pixel.0[..3] != [0, 0, 0]), "the first capture is drawn");
     // Each fits alone.
     let second = spawn(&mut app, synthetic(24_000, 2, false));
-    run(&mut app, 20);
+    run_frames(&mut app, 20);
     assert_eq!(app.world().get::<CaptureState>(second), Some(&CaptureState::Ready), "the second capture is uploaded");
     assert!(read(&mut app) == before, "the first capture is drawn as before");
-    run(&mut app, 70);
+    run_frames(&mut app, 70);
     assert_eq!(drawn(&app), Some(24_000), "the first capture is drawn after further attempts");
     assert!(read(&mut app) == before, "the picture is unchanged after further attempts");
     // Once the first capture is gone, there is room for the second.
     let mut captures = app.world_mut().query_filtered::<Entity, With<GaussianCapture3d>>();
     let first = captures.iter(app.world()).find(|entity| *entity != second).expect("the first capture");
     app.world_mut().despawn(first);
-    run(&mut app, 5);
+    run_frames(&mut app, 5);
     assert_eq!(drawn(&app), Some(24_000), "the second capture is drawn");
     assert!(read(&mut app) != before, "the picture shows the second capture");
 }
 
 #[test]
 fn a_device_that_refuses_a_layout_is_reported_and_the_app_goes_on() {
-    let lowered = limited_app(|settings, limits| {
+    let lowered = limited(|settings, limits| {
         // The pass that writes color and depth needs two. No limit is checked before.
         settings.constrained_limits = Some(WgpuLimits { max_storage_textures_per_shader_stage: 1, ..limits });
     });
     let Some((mut app, _)) = lowered else { return };
     let failures = failures_of(&mut app);
     let entity = spawn(&mut app, red());
-    run(&mut app, 10);
+    run_frames(&mut app, 10);
     let why = app.world().resource::<CaptureStatistics>().renderer_missing().expect("the renderer is missing");
     assert!(why.contains("refused"), "the reason says that the GPU refused an object: {why}");
     let said = about(&failures, entity);
@@ -197,5 +167,5 @@ fn a_pipeline_that_the_gpu_refuses_is_left_out_and_the_app_goes_on() {
     let (device, cache) = (world.resource::<RenderDevice>(), world.resource::<PipelineCache>());
     let refused = pipelines.specialize(device, cache, &Blending, TextureFormat::Rgba32Uint);
     assert_eq!(refused, None, "integers cannot be blended");
-    run(&mut app, 3);
+    run_frames(&mut app, 3);
 }

@@ -1,8 +1,9 @@
 //! `testing::film`: a scene of Bevy's own means, filmed as a dataset.
 //!
-//! In: a moving, unlit sphere; the island of the example `film`. Out: proof that the island is a loop and stays in sight, that the crate's reader opens the dataset, that the cameras project the sphere onto its pixels, that
-//! coverage is right, that runs repeat to the byte, and that folders are not overwritten. Tests that draw are skipped without a GPU; a software
-//! driver is enough.
+//! In: a moving, unlit sphere; the island of the example `film`. Out: proof that the island is a loop and stays in
+//! sight, that the crate's reader opens the dataset, that the cameras project the sphere onto its pixels, that coverage
+//! is right, that runs repeat to the byte, and that folders are not overwritten. Tests that draw are skipped without a
+//! GPU; a software driver is enough.
 
 #[path = "../../examples/film/island.rs"]
 mod island;

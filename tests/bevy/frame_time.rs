@@ -1,6 +1,7 @@
 //! GPU times on devices without timestamps inside passes, such as some of Metal.
 //!
-//! In: a device without the feature. Out: proof that the frame is measured as a whole. Skipped without a GPU, or on a GPU without timestamps.
+//! In: a device without the feature. Out: proof that the frame is measured as a whole. Skipped without a GPU, or on a
+//! GPU without timestamps.
 
 use crate::support::fixtures::{spawn, synthetic};
 use crate::support::no_gpu::no_gpu;

@@ -1,8 +1,8 @@
 //! Captures among transparent items: glass, gizmos, wireframes and refraction in front of and behind them, and the sky.
 //!
-//! In: small scenes made by hand and panes of glass, in headless apps. Out: proof that items behind a capture show through it and items in
-//! front cover it, with the colors computed from pictures of each alone, with and without multisampling and HDR. Skipped without a GPU; a
-//! software driver is enough.
+//! In: small scenes made by hand and panes of glass, in headless apps. Out: proof that items behind a capture show
+//! through it and items in front cover it, with the colors computed from pictures of each alone, with and without
+//! multisampling and HDR. Skipped without a GPU; a software driver is enough.
 
 use crate::support::blob::blob;
 use crate::support::cpu_reference::{SIZE, color, difference_between, eye, rgb, scene};
@@ -43,8 +43,8 @@ fn color_at(picture: &RgbaImage, x: u32, y: u32) -> Vec3 {
     color(picture, x, y) / 255.0
 }
 
-/// Checks every pixel against a color computed from other pictures. The tolerance covers the rounding of all pictures to 8 bits, which
-/// linear light amplifies for dark colors.
+/// Checks every pixel against a color computed from other pictures. The tolerance covers the rounding of all pictures
+/// to 8 bits, which linear light amplifies for dark colors.
 fn check_pixels(picture: &RgbaImage, expected: impl Fn(u32, u32) -> Vec3, what: &str) {
     for y in 0..picture.height() {
         for x in 0..picture.width() {

@@ -1,8 +1,8 @@
 //! Trained captures through a headless Bevy app, against pictures of the original implementation.
 //!
-//! In: the folder named by `GS4D_DATA`, with checkpoints, golden cameras (`.json`) and golden pictures (`.npz`). Out: proof that the PSNR
-//! of every view is at the level of rounding to 8 bits, and that few pixels differ by more than 1 / 255. Skipped without the folder or
-//! without a GPU.
+//! In: the folder named by `GS4D_DATA`, with checkpoints, golden cameras (`.json`) and golden pictures (`.npz`). Out:
+//! proof that the PSNR of every view is at the level of rounding to 8 bits, and that few pixels differ by more than
+//! 1 / 255. Skipped without the folder or without a GPU.
 
 use crate::support::cpu_reference::differences;
 use crate::support::offscreen_app::{app, picture, spawn_camera};

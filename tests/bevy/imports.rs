@@ -1,48 +1,35 @@
 //! Captures of other makes as assets in Bevy apps.
 //!
-//! In: files of every format that is exported, and files of other makes. Out: proof that `assets.load` shows what `codec::load` reads, with the
-//! settings given; that other files of a folder are found; that failures have a message; that the example `play` shows what is dropped on its
-//! window. Needs neither a GPU nor a window.
+//! In: files of every format that is exported, and files of other makes. Out: proof that `assets.load` shows what
+//! `codec::load` reads, with the settings given; that other files of a folder are found; that failures have a message;
+//! that the example `play` shows captures that are dropped on its window. Needs neither a GPU nor a window.
 
 #[path = "../../examples/play/drop.rs"]
 mod drop;
 
+use crate::support::asset_app::{app, scene, wait};
 use crate::support::data::data;
 use crate::support::waiting::wait_until;
 use bevy::asset::UnapprovedPathMode;
 use bevy::prelude::*;
 use bevy::window::FileDragAndDrop;
-use bevy_gs4d::asset::{CaptureState, GaussianCapture};
+use bevy_gs4d::asset::{CaptureLoaderSettings, CaptureState, GaussianCapture};
 use bevy_gs4d::codec::{self, ReadOptions};
-use bevy_gs4d::internal::codec::export::{EXPORTS, Export, Exporter};
+use bevy_gs4d::internal::codec::{EXPORTS, Export, Exporter};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
-use bevy_gs4d::scene::{FilterKind, RuntimeScene, UpAxis};
+use bevy_gs4d::scene::{FilterKind, UpAxis};
 use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugins};
 use drop::drop_file;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Returns an app whose assets are in `folder`.
-fn app(folder: &Path) -> App {
-    let file_path = folder.to_str().expect("temporary folders have plain names").into();
-    let mut app = App::new();
-    app.add_plugins((MinimalPlugins, AssetPlugin { file_path, ..default() }, GaussianCapturePlugins));
-    app
-}
-
 /// Loads a capture with these settings and waits until it is ready or has failed.
 fn loaded(app: &mut App, name: &str, options: &ReadOptions) -> (Handle<GaussianCapture>, CaptureState) {
     let options = options.clone();
-    let settings = move |own: &mut ReadOptions| own.clone_from(&options);
+    let settings = move |settings: &mut CaptureLoaderSettings| settings.read.clone_from(&options);
     let capture = app.world().resource::<AssetServer>().load_builder().with_settings(settings).load(name.to_owned());
-    let entity = app.world_mut().spawn(GaussianCapture3d(capture.clone())).id();
-    let state = |app: &App| app.world().get::<CaptureState>(entity).expect("every capture has a state").clone();
-    wait_until(app, name, |app| state(app) != CaptureState::Loading, App::update);
-    (capture, state(app))
-}
-
-fn scene<'a>(app: &'a App, capture: &Handle<GaussianCapture>) -> &'a RuntimeScene {
-    app.world().resource::<Assets<GaussianCapture>>().get(capture).expect("it is loaded").scene()
+    let state = wait(app, name, &capture);
+    (capture, state)
 }
 
 /// Writes a file of the format for each time, and returns the name of each.
@@ -123,7 +110,8 @@ fn files_that_a_capture_names_are_found_beside_it() {
 #[test]
 fn a_file_that_is_no_capture_fails_with_the_reason() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let points = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n0 0 0\n";
+    let points = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n\
+                  end_header\n0 0 0\n";
     fs::write(folder.path().join("points.ply"), points).expect("the folder can be written to");
     fs::write(folder.path().join("text.spz"), "no capture").expect("the folder can be written to");
     let mut app = app(folder.path());

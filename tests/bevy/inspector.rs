@@ -1,8 +1,8 @@
 //! The inspector's panel, in Bevy apps without a window.
 //!
-//! In: captures that have been loaded, failed to load, or are missing. Out: proof that the panel covers only its edge of the picture,
-//! changes no component without input, and warns of faults, and that debug views change pixels. Skipped without a GPU; a software driver is
-//! enough.
+//! In: captures that have been loaded, failed to load, or are missing. Out: proof that the panel covers only its edge
+//! of the picture, changes no component without input, and warns of faults, and that debug views change pixels. Skipped
+//! without a GPU; a software driver is enough.
 
 use crate::support::cpu_reference::{difference, view};
 use crate::support::fixtures::debug_picture;

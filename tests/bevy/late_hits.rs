@@ -1,7 +1,7 @@
 //! Pointer events on large captures, which are searched in the background.
 //!
-//! In: a capture with more Gaussians than are searched in a frame, pointer input. Out: proof that the events arrive some frames later, and
-//! that they stay while the pointer rests. Skipped without a GPU; a software driver is enough.
+//! In: a capture with more Gaussians than are searched in a frame, pointer input. Out: proof that the events arrive
+//! some frames later, and that they stay while the pointer rests. Skipped without a GPU; a software driver is enough.
 
 use crate::support::cpu_reference::SIZE;
 use crate::support::fixtures::{front, lone, spawn};

@@ -1,7 +1,8 @@
 //! The Bevy plugin, in apps without a window, and the examples as programs.
 //!
-//! In: scenes made here, `assets/`, and the trained captures where `GS4D_DATA` names their folder. Out: one test binary. The header of each
-//! module describes its tests. Tests that draw are skipped without a GPU; a software driver is enough.
+//! In: scenes made here, `assets/`, and the trained captures where `GS4D_DATA` names their folder. Out: one test
+//! binary. The header of each module describes its tests. Tests that draw are skipped without a GPU; a software driver
+//! is enough.
 
 mod animation;
 mod app;
@@ -18,6 +19,7 @@ mod imports;
 mod inactive;
 mod inspector;
 mod late_hits;
+mod loading;
 mod motion;
 mod own_shadows;
 mod picker;
@@ -40,6 +42,7 @@ mod walkthrough;
 
 #[path = "../support"]
 mod support {
+    pub mod asset_app;
     pub mod blob;
     pub mod cpu_reference;
     pub mod data;
@@ -47,14 +50,18 @@ mod support {
     pub mod fixtures;
     pub mod flat;
     pub mod gpu;
+    pub mod gray;
+    pub mod limited_app;
     pub mod logged;
     pub mod no_gpu;
     pub mod npy;
     pub mod npz;
     pub mod offscreen_app;
+    pub mod pipelines;
     pub mod playback_app;
     pub mod pth;
     pub mod skip;
     pub mod spans;
     pub mod waiting;
+    pub mod warning_layer;
 }

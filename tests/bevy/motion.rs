@@ -1,8 +1,8 @@
 //! Captures in post-processing: motion vectors, temporal anti-aliasing, motion blur, depth of field, volumetric fog.
 //!
-//! In: flat captures made by hand, which are at rest or move by the same distance in each frame. Out: proof that their motion vectors are
-//! correct, and that Bevy's effects treat captures as moving surfaces with default camera settings. The tests count frames, so rendering is
-//! not pipelined. Skipped without a GPU; a software driver is enough.
+//! In: flat captures made by hand, which are at rest or move by the same distance in each frame. Out: proof that their
+//! motion vectors are correct, and that Bevy's effects treat captures as moving surfaces with default camera settings.
+//! The tests count frames, so rendering is not pipelined. Skipped without a GPU; a software driver is enough.
 
 use crate::support::blob::blob;
 use crate::support::cpu_reference::scene;
@@ -79,7 +79,8 @@ fn read_vectors(@builtin(global_invocation_id) id: vec3<u32>) {
 }
 ";
 
-/// Copies the camera's motion vectors and prepass depths by a shader after captures are drawn, since Bevy's textures have no copy usage.
+/// Copies the camera's motion vectors and prepass depths by a shader after captures are drawn, since Bevy's textures
+/// have no copy usage.
 fn read_vectors(
     camera: ViewQuery<&ViewPrepassTextures>,
     device: Res<RenderDevice>,

@@ -1,7 +1,8 @@
 //! Captures that cast shadows and receive them: the shadow of a capture on itself.
 //!
-//! In: a ball and a wall of coarse Gaussians, made by hand, and lights of all kinds, in headless apps. Out: proof that surfaces towards a light
-//! look as without their own shadow, and that one part of a capture shadows another. Skipped without a GPU; a software driver is enough.
+//! In: a ball and a wall of coarse Gaussians, made by hand, and lights of all kinds, in headless apps. Out: proof that
+//! surfaces towards a light look as without their own shadow, and that one part of a capture shadows another. Skipped
+//! without a GPU; a software driver is enough.
 
 use crate::support::blob::blob;
 use crate::support::cpu_reference::{color, scene};
@@ -77,7 +78,8 @@ fn for_each_light(capture: &RuntimeScene, check: impl Fn(&str, &RgbaImage, &Rgba
     }
 }
 
-/// Returns the largest difference, in 255ths, of the pixels whose camera ray is in `region`: the ray's point in the plane z = 0.
+/// Returns the largest difference, in 255ths, of the pixels whose camera ray is in `region`: the ray's point in the
+/// plane z = 0.
 fn largest_difference(a: &RgbaImage, b: &RgbaImage, region: impl Fn(Vec2) -> bool) -> f32 {
     let scale = DISTANCE * (FOV_Y / 2.0).tan();
     let mut largest = 0.0f32;

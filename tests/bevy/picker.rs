@@ -1,12 +1,13 @@
 //! The picker in Bevy apps: rays in world space against captures that are placed, played, cropped and hidden.
 //!
-//! In: small scenes made by hand. Out: proof that a ray hits the visible Gaussians at their visible positions. Needs neither a GPU nor a
-//! window. `tests/core/pick.rs` and `scene::pick` test rays against the Gaussians themselves.
+//! In: small scenes made by hand. Out: proof that a ray hits the visible Gaussians at their visible positions. Needs
+//! neither a GPU nor a window. `tests/core/pick.rs` and `scene::pick` test rays against the Gaussians themselves.
 
+use crate::support::gray::scene;
 use bevy::ecs::system::RunSystemOnce;
 use bevy::prelude::*;
 use bevy_gs4d::asset::GaussianCapture;
-use bevy_gs4d::gaussian::{Gaussian, Harmonics};
+use bevy_gs4d::gaussian::Gaussian;
 use bevy_gs4d::picker::{CaptureHit, CapturePicker};
 use bevy_gs4d::playback::{ClipFade, Playback};
 use bevy_gs4d::render::{CaptureSettings, CropBox};
@@ -27,19 +28,14 @@ fn ball(mean: Vec3, opacity: f32) -> Gaussian {
     }
 }
 
-/// Returns a scene with a duration of one second.
-fn scene(gaussians: &[Gaussian]) -> RuntimeScene {
-    let harmonics = Harmonics { coefficients: 1, values: vec![0.0; gaussians.len() * 3], ..Harmonics::default() };
-    RuntimeScene::sliced(gaussians.to_vec(), harmonics)
-}
-
 fn app() -> App {
     let mut app = App::new();
     app.add_plugins((MinimalPlugins, AssetPlugin::default(), GaussianCapturePlugins));
     app
 }
 
-/// Spawns a capture with a transform, paused at its start. The app has no plugins for transforms and visibility, so both are set here.
+/// Spawns a capture with a transform, paused at its start. The app has no plugins for transforms and visibility, so
+/// both are set here.
 fn place(app: &mut App, scene: RuntimeScene, transform: Transform) -> Entity {
     let handle = app.world_mut().resource_mut::<Assets<GaussianCapture>>().add(GaussianCapture::new(scene));
     let seen = (GlobalTransform::from(transform), InheritedVisibility::VISIBLE);

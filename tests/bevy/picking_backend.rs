@@ -1,8 +1,8 @@
 //! Pointer events on captures in Bevy apps without a window: a pointer moves over and clicks on captures and meshes.
 //!
-//! In: a small capture, boxes in front of it and behind it, pointer input. Out: proof that events go to the nearest object, with the depth
-//! convention of meshes, and that `Pickable`, layers, visibility and markers have their usual meaning. Skipped without a GPU; a software
-//! driver is enough.
+//! In: a small capture, boxes in front of it and behind it, pointer input. Out: proof that events go to the nearest
+//! object, with the depth convention of meshes, and that `Pickable`, layers, visibility and markers have their usual
+//! meaning. Skipped without a GPU; a software driver is enough.
 
 use crate::support::cpu_reference::SIZE;
 use crate::support::fixtures::{front, insert, lone, spawn, spawn_flat_box};

@@ -1,7 +1,7 @@
 //! Playback in Bevy apps: events, shared clocks, the game's time, and entities in components.
 //!
-//! In: captures of two seconds with key-frames every half second. Out: proof that times are right and that every change sends its event.
-//! Needs neither a GPU nor a window.
+//! In: captures of two seconds with key-frames every half second. Out: proof that times are right and that every change
+//! sends its event. Needs neither a GPU nor a window.
 
 use crate::support::event_log::{debug, take_events};
 use crate::support::playback_app::{app, capture, change, get, pass};

@@ -1,7 +1,8 @@
 //! The group of plugins: parts that are left out, and plugins in another order.
 //!
-//! In: apps with some of the plugins, added in any order. Out: proof that the app goes on, that captures load, play and are drawn as far as the
-//! plugins allow it, and that the log has one warning with the remedy. The test that draws is skipped without a GPU.
+//! In: apps with some of the plugins, added in any order. Out: proof that the app goes on, that captures load, play and
+//! are drawn as far as the plugins allow it, and that the log has one warning with the remedy. The test that draws is
+//! skipped without a GPU.
 
 use crate::support::cpu_reference::{SIZE, eye};
 use crate::support::fixtures::{lone, spawn};

@@ -1,8 +1,8 @@
 //! Checkpoints that Bevy processes to packages, in apps without a window.
 //!
-//! In: small checkpoints in the folder of a game's assets, with and without `.meta` files. Out: proof that the game loads packages in their place,
-//! that settings decide what these are like, and that a changed `.meta` file, and nothing else, makes Bevy process a checkpoint again. Needs neither
-//! a GPU nor a window.
+//! In: small checkpoints in the folder of a game's assets, with and without `.meta` files. Out: proof that the game
+//! loads packages in their place, that settings decide what these are like, and that a changed `.meta` file, and
+//! nothing else, makes Bevy process a checkpoint again. Needs neither a GPU nor a window.
 
 use crate::support::pth::Pth;
 use crate::support::waiting::wait_until;
@@ -35,12 +35,16 @@ impl Game {
         self.0.path().join(name)
     }
 
-    /// Writes the `.meta` file of the checkpoint with these settings of the transformer.
-    fn set(&self, settings: &str) {
+    /// Writes the `.meta` file of the checkpoint with these settings of the loader and of the transformer.
+    fn set(&self, loader: &str, transformer: &str) {
         let meta = format!(
             "(meta_format_version: \"1.0\", asset: Process(
-                processor: \"LoadTransformAndSave<CheckpointLoader, CaptureTransformer, PackageSaver>\",
-                settings: (loader_settings: (), transformer_settings: ({settings}), saver_settings: (level: 19)),
+                processor: \"LoadTransformAndSave<CaptureLoader, CaptureTransformer, PackageSaver>\",
+                settings: (
+                    loader_settings: ({loader}),
+                    transformer_settings: ({transformer}),
+                    saver_settings: (level: 19),
+                ),
             ))"
         );
         fs::write(self.path("assets/tiny.pth.meta"), meta).expect("the folder can be written to");
@@ -100,15 +104,25 @@ fn a_checkpoint_is_loaded_as_the_package_that_it_was_processed_to() {
 fn a_changed_meta_file_processes_the_checkpoint_again() {
     let game = Game::new();
     fs::remove_file(game.path("assets/cfg_args")).expect("the file exists");
-    game.set("form: Runtime, segments: None, sh_degree: 1");
+    game.set("", "form: Runtime, segments: None, sh_degree: 1");
     let scene = game.play();
     let (header, _) = game.processed();
     assert_eq!((header.form, header.degree), (StoredForm::Sliced, 1), "as the settings say");
     assert!(scene.filter.is_none(), "without a filter");
-    game.set("packing: (bits: (mean: 12), color_step: 0.0), segments: Some(4)");
+    game.set("", "packing: (bits: (mean: 12), color_step: 0.0), segments: Some(4)");
     let scene = game.play();
     let (header, _) = game.processed();
     assert!(matches!(header.form, StoredForm::Packed { .. }), "as the changed settings say");
     assert_eq!(header.filter.map(|filter| filter.segments), Some(4), "with the filter that they say");
     assert_eq!(scene.form.color_degrees().degree, 3, "and colors of all degrees");
+}
+
+#[test]
+fn settings_of_the_loader_are_kept_in_the_processed_capture() {
+    let game = Game::new();
+    game.set("read: (duration_seconds: Some(7.0)), asset_usage: (\"RENDER_WORLD\")", "segments: None");
+    assert_eq!(game.play().playback.duration_seconds, 7.0, "in the package");
+    let meta = fs::read_to_string(game.path("processed/tiny.pth.meta")).expect("the file was processed");
+    let is_kept = meta.contains("CaptureLoader") && meta.contains("\"RENDER_WORLD\"");
+    assert!(is_kept, "the Gaussians are needed for drawing alone, as the settings say: {meta}");
 }

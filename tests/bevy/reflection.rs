@@ -1,7 +1,9 @@
-//! Reflection and names: what scene files, animations and inspectors see of this crate, and what its prelude brings into a game.
+//! Reflection and names: what scene files, animations and inspectors see of this crate, and what its prelude brings
+//! into a game.
 //!
-//! In: the type registry of an app, the source of the plugin and of the prelude. Out: proof that every public component and resource is
-//! registered, by a path that exists, and that names of the prelude are this crate's own. Needs neither a GPU nor a window.
+//! In: the type registry of an app, the source of the plugin and of the prelude. Out: proof that every public component
+//! and resource is registered, by a path that exists, and that names of the prelude are this crate's own. Needs neither
+//! a GPU nor a window.
 
 use bevy::ecs::reflect::ReflectResource;
 use bevy::prelude::*;
@@ -63,11 +65,9 @@ fn reflected() -> Vec<(String, &'static str)> {
 /// Returns the paths of types that have a path for Bevy's asset server and are not registered themselves.
 fn named() -> Vec<(String, &'static str)> {
     paths![
+        bevy_gs4d::asset::CaptureLoader,
         bevy_gs4d::asset::CaptureTransformer,
-        bevy_gs4d::asset::CheckpointLoader,
         bevy_gs4d::asset::GaussianCapture,
-        bevy_gs4d::asset::ImportLoader,
-        bevy_gs4d::asset::PackageLoader,
         bevy_gs4d::asset::PackageSaver,
         bevy_gs4d::playback::Timeline,
         bevy_gs4d::playback::TimelineLoader,

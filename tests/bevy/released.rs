@@ -1,17 +1,19 @@
 //! Captures whose Gaussians are dropped from memory once they are on the GPU.
 //!
-//! In: a package, loaded with both usages and for the render world alone. Out: proof that the pictures are equal, and that picking and saving
-//! report the missing Gaussians. Skipped without a GPU; a software driver is enough.
+//! In: a package, loaded with both usages and for the render world alone, and a checkpoint. Out: proof that the
+//! pictures are equal, that picking and saving report the missing Gaussians, and that the usages do not depend on the
+//! format. Skipped without a GPU; a software driver is enough.
 
-use crate::support::fixtures::synthetic;
+use crate::support::fixtures::{synthetic, synthetic_eye};
 use crate::support::offscreen_app::{app, picture, spawn_camera};
+use crate::support::pth::Pth;
 use bevy::asset::RenderAssetUsages;
 use bevy::asset::saver::{SavedAsset, save_using_saver};
 use bevy::ecs::system::RunSystemOnce;
 use bevy::prelude::*;
 use bevy::tasks::block_on;
 use bevy_gs4d::GaussianCapture3d;
-use bevy_gs4d::asset::{GaussianCapture, PackageLoaderSettings, PackageSaver, PackageSaverSettings};
+use bevy_gs4d::asset::{CaptureLoaderSettings, GaussianCapture, PackageSaver, PackageSaverSettings};
 use bevy_gs4d::codec::package::WriteSettings;
 use bevy_gs4d::offline;
 use bevy_gs4d::picker::CapturePicker;
@@ -24,22 +26,18 @@ const SIZE: UVec2 = UVec2::new(64, 48);
 /// Returns an app that draws the capture in a file, loaded with these usages, and its handle.
 fn drawing(file: &Path, asset_usage: RenderAssetUsages) -> Option<(App, Handle<GaussianCapture>)> {
     let mut app = app(SIZE)?;
-    let settings = move |settings: &mut PackageLoaderSettings| settings.asset_usage = asset_usage;
+    let settings = move |settings: &mut CaptureLoaderSettings| settings.asset_usage = asset_usage;
     let path = file.to_str().expect("temporary folders have plain names").to_owned();
     let capture = app.world().resource::<AssetServer>().load_builder().with_settings(settings).load(path);
     app.world_mut().spawn((GaussianCapture3d(capture.clone()), Playback::paused_at(0.7)));
-    spawn_camera(&mut app, Msaa::Off, eye());
+    spawn_camera(&mut app, Msaa::Off, synthetic_eye());
     Some((app, capture))
-}
-
-fn eye() -> Transform {
-    Transform::from_xyz(0.5, -3.0, 1.5).looking_at(Vec3::ZERO, Vec3::Z)
 }
 
 /// Returns whether a ray from the camera towards any of the points around the origin hits a capture.
 fn is_hit(app: &mut App) -> bool {
     let cast = |picker: CapturePicker| {
-        let eye = eye().translation;
+        let eye = synthetic_eye().translation;
         let towards = |x: i32, z: i32| Dir3::new(Vec3::new(x as f32, 0.0, z as f32) * 0.1 - eye).expect("not the eye");
         (-5..=5)
             .flat_map(|x| (-5..=5).map(move |z| (x, z)))
@@ -53,7 +51,7 @@ fn a_capture_without_a_copy_in_memory_is_drawn_and_reports_that_it_cannot_be_pic
     let folder = tempfile::tempdir().expect("a temporary folder");
     let file = folder.path().join("small.gs4d");
     let scene = GaussianScene::from(synthetic(2000, 1, true));
-    offline::save(&file, &scene, &WriteSettings { level: 1 }).expect("the folder can be written to");
+    offline::work::save(&file, &scene, &WriteSettings { level: 1 }).expect("the folder can be written to");
     let mut pictures = Vec::new();
     for usages in [RenderAssetUsages::default(), RenderAssetUsages::RENDER_WORLD] {
         let Some((mut app, handle)) = drawing(&file, usages) else { return };
@@ -83,4 +81,15 @@ fn a_capture_without_a_copy_in_memory_is_drawn_and_reports_that_it_cannot_be_pic
     }
     assert!(pictures[0].pixels().any(|pixel| pixel.0[..3] != [0, 0, 0]), "the capture is drawn");
     assert!(pictures[0] == pictures[1], "the pictures are equal");
+}
+
+#[test]
+fn a_checkpoint_without_a_copy_in_memory_is_drawn() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = folder.path().join("tiny.pth");
+    std::fs::write(&file, Pth::rotating(40, 48).bytes()).expect("the folder can be written to");
+    let Some((mut app, handle)) = drawing(&file, RenderAssetUsages::RENDER_WORLD) else { return };
+    picture(&mut app, 0.0);
+    let capture = app.world().resource::<Assets<GaussianCapture>>().get(&handle).expect("still loaded");
+    assert!(capture.is_released() && capture.scene().is_empty(), "the Gaussians are released");
 }

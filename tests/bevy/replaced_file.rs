@@ -1,7 +1,7 @@
 //! The example `play` shows a capture whose file is replaced, as `gs4d train` replaces its output.
 //!
-//! In: a package outside the folder of assets, replaced while it is shown. Out: proof that the new contents are loaded, once, and that a file
-//! which does not change is not loaded again. Needs neither a GPU nor a window.
+//! In: a package outside the folder of assets, replaced while it is shown. Out: proof that the new contents are loaded,
+//! once, and that a file which does not change is not loaded again. Needs neither a GPU nor a window.
 
 #[path = "../../examples/play/live.rs"]
 mod live;
@@ -19,7 +19,7 @@ use std::path::Path;
 
 fn write(path: &Path, count: usize) {
     let scene = synthesize(&SynthSettings { count, ..SynthSettings::default() });
-    offline::save(path, &scene, &WriteSettings::default()).expect("the folder can be written to");
+    offline::work::save(path, &scene, &WriteSettings::default()).expect("the folder can be written to");
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Captures in Bevy's scene notation and in scene files.
 //!
-//! In: a small package in the folder of a game's assets, scenes in `bsn!`, a world that is saved. Out: proof that captures of a scene load and
-//! play, and that a scene file keeps their components. Needs neither a GPU nor a window.
+//! In: a small package in the folder of a game's assets, scenes in `bsn!`, a world that is saved. Out: proof that
+//! captures of a scene load and play, and that a scene file keeps their components. Needs neither a GPU nor a window.
 
 use crate::support::playback_app::{self, get, pass};
 use crate::support::waiting::wait_until;
@@ -23,7 +23,7 @@ use tempfile::TempDir;
 fn folder() -> TempDir {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("capture.gs4d");
-    offline::save(&path, &playback_app::scene(2.0, 4), &WriteSettings { level: 1 })
+    offline::work::save(&path, &playback_app::scene(2.0, 4), &WriteSettings { level: 1 })
         .expect("the folder can be written to");
     folder
 }

@@ -1,8 +1,9 @@
 //! Fog, shadows of meshes and the light of the surroundings on captures.
 //!
-//! In: flat captures made by hand and meshes of the same color, in headless apps. Out: proof that fog equals the fog of Bevy's meshes and
-//! does not show black particles, that shadows and dark rooms darken captures with the components by the documented factors, and that other cameras have no extra pass. Skipped
-//! without a GPU; a software driver is enough.
+//! In: flat captures made by hand and meshes of the same color, in headless apps. Out: proof that fog equals the fog of
+//! Bevy's meshes and does not show black particles, that shadows and dark rooms darken captures with the components by
+//! the documented factors, and that other cameras have no extra pass. Skipped without a GPU; a software driver is
+//! enough.
 
 use crate::support::blob::blob;
 use crate::support::cpu_reference::{SIZE, color, difference_between, rgb, scene};
@@ -24,8 +25,8 @@ use image::RgbaImage;
 /// The color of walls, sRGB-encoded.
 const COLOR: Vec3 = Vec3::new(0.6, 0.4, 0.8);
 
-/// Returns a flat wall through the origin that is opaque to less than an 8-bit step: three splats with an opacity of 0.95 transmit
-/// 0.000125, and blending ends at 0.0001.
+/// Returns a flat wall through the origin that is opaque to less than an 8-bit step: three splats with an opacity of
+/// 0.95 transmit 0.000125, and blending ends at 0.0001.
 fn wall() -> RuntimeScene {
     scene(&[(blob(Vec3::ZERO, Vec3::new(30.0, 30.0, 1e-3), 0.95), COLOR); 3])
 }

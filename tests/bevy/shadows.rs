@@ -1,9 +1,9 @@
 //! Shadows that captures cast on a floor, compared to shadows of meshes with the same outline.
 //!
-//! In: a ball of opaque Gaussians, a mesh of the same size, lights of all kinds, in headless apps. Out: proof that both darken the same
-//! pixels, that shadows follow the capture's time and end with the capture, that only captures with the component, and without Bevy's
-//! `NotShadowCaster`, cast shadows, whether a camera sees them or not, and that a contact shadow darkens only the ground beneath its capture. Skipped without a GPU; a software driver
-//! is enough.
+//! In: a ball of opaque Gaussians, a mesh of the same size, lights of all kinds, in headless apps. Out: proof that both
+//! darken the same pixels, that shadows follow the capture's time and end with the capture, that only captures with the
+//! component, and without Bevy's `NotShadowCaster`, cast shadows, whether a camera sees them or not, and that a contact
+//! shadow darkens only the ground beneath its capture. Skipped without a GPU; a software driver is enough.
 
 use crate::support::blob::blob;
 use crate::support::cpu_reference::{DURATION, difference_between, rgb, scene};

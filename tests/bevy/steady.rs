@@ -1,24 +1,28 @@
 //! Captures over many frames: no needless GPU work, and no leaked memory.
 //!
-//! In: synthetic captures in headless apps. Out: proof that GPU memory is constant while time advances, that the memory of removed captures
-//! and cameras is released, that views release unused memory, that captures are replaced without a gap and survive a restart of the
-//! renderer, and that insufficient GPU limits and invalid captures are reported. Skipped without a GPU.
+//! In: synthetic captures in headless apps. Out: proof that GPU memory is constant while time advances, that the memory
+//! of removed captures and cameras is released, that views release unused memory, that captures are replaced without a
+//! gap and survive a restart of the renderer, and that insufficient GPU limits and invalid captures are reported.
+//! Skipped without a GPU.
 
 use crate::support::blob::blob;
 use crate::support::cpu_reference::scene;
-use crate::support::fixtures::synthetic;
+use crate::support::event_log::failures_of;
+use crate::support::fixtures::{synthetic, synthetic_eye};
+use crate::support::limited_app::{device_settings, limited_app};
 use crate::support::no_gpu::no_gpu;
 use crate::support::offscreen_app::{self, app, picture, spawn_camera};
+use crate::support::pipelines::check_pipelines;
 use bevy::asset::AssetId;
 use bevy::camera::Hdr;
 use bevy::pbr::PbrPlugin;
 use bevy::prelude::*;
 use bevy::render::error_handler::{ErrorType, RenderErrorHandler, RenderErrorPolicy};
 use bevy::render::gpu_readback::{Readback, ReadbackComplete};
-use bevy::render::render_resource::{CachedPipelineState, PipelineCache, PollType};
+use bevy::render::render_resource::PollType;
 use bevy::render::renderer::RenderDevice;
-use bevy::render::settings::{Backends, RenderCreation, WgpuLimits, WgpuSettings};
-use bevy::render::{RenderApp, RenderPlugin, RenderStartup};
+use bevy::render::settings::{RenderCreation, WgpuLimits};
+use bevy::render::{RenderApp, RenderStartup};
 use bevy::time::TimeUpdateStrategy;
 use bevy_gs4d::asset::{CaptureFailed, CaptureReady, CaptureState, GaussianCapture};
 use bevy_gs4d::gaussian::Gaussian;
@@ -37,20 +41,10 @@ use std::time::{Duration, Instant};
 const SIZE: UVec2 = UVec2::new(64, 48);
 const STEP: Duration = Duration::from_millis(10);
 
-fn settings() -> WgpuSettings {
-    let backends = if cfg!(target_os = "linux") { Backends::VULKAN } else { Backends::PRIMARY };
-    WgpuSettings { backends: Some(backends), ..default() }
-}
-
 /// Returns `count` Gaussians of one color, at rest at the origin.
 fn heap(count: usize, color: Vec3) -> RuntimeScene {
     let gaussian = Gaussian { covariance: [0.2, 0.0, 0.0, 0.2, 0.0, 0.2], ..blob(Vec3::ZERO, Vec3::ONE, 0.98) };
     scene(&vec![(gaussian, color); count])
-}
-
-/// Returns the pose of a camera that sees a synthetic scene.
-fn eye() -> Transform {
-    Transform::from_xyz(0.5, -3.0, 1.5).looking_at(Vec3::ZERO, Vec3::Z)
 }
 
 fn spawn(app: &mut App, scene: RuntimeScene, playback: Playback) -> Entity {
@@ -60,9 +54,9 @@ fn spawn(app: &mut App, scene: RuntimeScene, playback: Playback) -> Entity {
 
 /// Spawns two cameras with targets of one size, of which the second writes depth.
 fn spawn_eyes(app: &mut App) {
-    spawn_camera(app, Msaa::Off, eye());
+    spawn_camera(app, Msaa::Off, synthetic_eye());
     let second = Offscreen::new(&mut app.world_mut().resource_mut::<Assets<Image>>(), SIZE);
-    let camera = spawn_camera(app, Msaa::Off, eye().with_translation(Vec3::new(-0.5, -3.0, 1.5)));
+    let camera = spawn_camera(app, Msaa::Off, synthetic_eye().with_translation(Vec3::new(-0.5, -3.0, 1.5)));
     let depth = CaptureViewSettings { depth: DepthWrite::Median, ..default() };
     app.world_mut().entity_mut(camera).insert((second.target(), depth));
 }
@@ -82,21 +76,11 @@ fn run_in_steps(app: &mut App, frames: usize, step: Duration) {
     app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::ZERO));
 }
 
-/// Waits until the GPU has finished and its counters have arrived, so that their delay in frames does not depend on the load of the
-/// machine.
+/// Waits until the GPU has finished and its counters have arrived, so that their delay in frames does not depend on the
+/// load of the machine.
 fn finish_drawing(app: &App) {
     let device = app.world().resource::<RenderDevice>().wgpu_device();
     device.poll(PollType::wait_indefinitely()).expect("the GPU finishes its work");
-}
-
-/// Collects the failures of captures from now on.
-fn failures_of(app: &mut App) -> Arc<Mutex<Vec<CaptureFailed>>> {
-    let failures = Arc::new(Mutex::new(Vec::new()));
-    let sink = failures.clone();
-    app.add_observer(move |failure: On<CaptureFailed>| {
-        sink.lock().unwrap_or_else(PoisonError::into_inner).push(failure.event().clone());
-    });
-    failures
 }
 
 fn statistics(app: &App) -> CaptureStatistics {
@@ -121,14 +105,6 @@ fn view_bytes(app: &App, camera: Entity) -> u64 {
 
 fn show(app: &mut App, entity: Entity, visibility: Visibility) {
     app.world_mut().entity_mut(entity).insert(visibility);
-}
-
-fn check_pipelines(app: &App) {
-    for pipeline in app.sub_app(RenderApp).world().resource::<PipelineCache>().pipelines() {
-        if let CachedPipelineState::Err(failure) = &pipeline.state {
-            panic!("a pipeline failed: {failure}");
-        }
-    }
 }
 
 #[test]
@@ -168,7 +144,7 @@ fn only_active_lists_are_written_from_segment_to_segment() {
 fn a_view_without_captures_releases_its_memory() {
     let Some(mut app) = app(SIZE) else { return };
     let entity = spawn(&mut app, synthetic(2000, 4, true), Playback::paused_at(0.7));
-    let camera = spawn_camera(&mut app, Msaa::Off, eye());
+    let camera = spawn_camera(&mut app, Msaa::Off, synthetic_eye());
     let before = picture(&mut app, 0.0);
     assert!(before.pixels().any(|pixel| pixel.0[..3] != [0, 0, 0]), "the capture is drawn");
     assert!(view_bytes(&app, camera) > 0, "the view has memory");
@@ -197,7 +173,7 @@ fn a_view_without_captures_releases_its_memory() {
 fn a_camera_that_cannot_draw_captures_releases_its_memory() {
     let Some(mut app) = app(SIZE) else { return };
     spawn(&mut app, synthetic(2000, 4, true), Playback::paused_at(0.7));
-    let camera = spawn_camera(&mut app, Msaa::Off, eye());
+    let camera = spawn_camera(&mut app, Msaa::Off, synthetic_eye());
     testing::settle(&mut app).expect("the app draws without an error");
     assert!(view_bytes(&app, camera) > 0, "the view has memory");
     app.world_mut().entity_mut(camera).insert((Hdr, CompositingSpace::Oklab));
@@ -209,7 +185,7 @@ fn a_camera_that_cannot_draw_captures_releases_its_memory() {
 fn a_transparent_capture_is_neither_prepared_nor_drawn() {
     let Some(mut app) = app(SIZE) else { return };
     let entity = spawn(&mut app, synthetic(2000, 4, true), Playback::default());
-    let camera = spawn_camera(&mut app, Msaa::Off, eye());
+    let camera = spawn_camera(&mut app, Msaa::Off, synthetic_eye());
     let before = picture(&mut app, 0.0);
     let gaussians = |app: &App| statistics(app).view(camera).map_or(0, |view| view.total);
     assert_eq!(gaussians(&app), 2000, "the camera draws all Gaussians");
@@ -236,7 +212,7 @@ fn a_view_shrinks_after_a_large_capture_is_despawned() {
     let Some(mut app) = app(SIZE) else { return };
     let large = spawn(&mut app, synthetic(100_000, 5, false), Playback::paused_at(0.7));
     spawn(&mut app, heap(1, Vec3::X), Playback::paused_at(0.7));
-    let camera = spawn_camera(&mut app, Msaa::Off, eye());
+    let camera = spawn_camera(&mut app, Msaa::Off, synthetic_eye());
     testing::settle(&mut app).expect("the app draws without an error");
     let (before, created) = (view_bytes(&app, camera), work(&app).created());
     assert!(app.world_mut().despawn(large), "the large capture existed");
@@ -257,13 +233,13 @@ fn a_view_shrinks_after_a_large_capture_is_despawned() {
 fn despawned_cameras_release_their_state() {
     let Some(mut app) = app(SIZE) else { return };
     spawn(&mut app, synthetic(500, 6, true), Playback::paused_at(0.7));
-    let camera = spawn_camera(&mut app, Msaa::Off, eye());
+    let camera = spawn_camera(&mut app, Msaa::Off, synthetic_eye());
     let before = picture(&mut app, 0.0);
     let other = Offscreen::new(&mut app.world_mut().resource_mut::<Assets<Image>>(), SIZE);
     let seeing = |app: &App| statistics(app).views().iter().map(|(camera, _)| *camera).collect::<Vec<_>>();
     for round in 0..20 {
         let msaa = if round % 2 == 0 { Msaa::Off } else { Msaa::Sample4 };
-        let passing = spawn_camera(&mut app, msaa, eye());
+        let passing = spawn_camera(&mut app, msaa, synthetic_eye());
         app.world_mut().entity_mut(passing).insert(other.target());
         run(&mut app, 2);
         let both = seeing(&app);
@@ -273,13 +249,13 @@ fn despawned_cameras_release_their_state() {
         assert_eq!(seeing(&app), [camera], "round {round}: only the first camera draws");
     }
     assert!(picture(&mut app, 0.0) == before, "the picture of the first camera is as before");
-    check_pipelines(&app);
+    check_pipelines(&app).expect("every pipeline compiles");
 }
 
 #[test]
 fn despawned_captures_release_their_memory() {
     let Some(mut app) = app(SIZE) else { return };
-    spawn_camera(&mut app, Msaa::Off, eye());
+    spawn_camera(&mut app, Msaa::Off, synthetic_eye());
     testing::settle(&mut app).expect("the app draws without an error");
     let statistics = statistics(&app);
     let mut living = VecDeque::new();
@@ -327,7 +303,7 @@ fn despawned_captures_release_their_memory() {
     );
     assert!(statistics.views().is_empty(), "no view draws captures");
     assert_eq!(app.world().resource::<Assets<GaussianCapture>>().len(), 0, "all assets are dropped");
-    check_pipelines(&app);
+    check_pipelines(&app).expect("every pipeline compiles");
 }
 
 /// Replaces the scene of an entity's capture.
@@ -361,7 +337,7 @@ fn state(app: &App, entity: Entity) -> CaptureState {
 fn a_large_capture_is_uploaded_over_several_frames() {
     const BUDGET: u64 = 64 << 10;
     let Some(mut app) = app(SIZE) else { return };
-    let camera = spawn_camera(&mut app, Msaa::Off, eye());
+    let camera = spawn_camera(&mut app, Msaa::Off, synthetic_eye());
     testing::settle(&mut app).expect("the app draws without an error");
     app.insert_resource(CaptureUploadBudget { bytes_per_frame: BUDGET });
     let ready = messages_of::<CaptureReady>(&mut app);
@@ -400,7 +376,7 @@ fn a_large_capture_is_uploaded_over_several_frames() {
 #[test]
 fn a_capture_plays_from_its_first_picture_on() {
     let Some(mut app) = app(SIZE) else { return };
-    spawn_camera(&mut app, Msaa::Off, eye());
+    spawn_camera(&mut app, Msaa::Off, synthetic_eye());
     testing::settle(&mut app).expect("the app draws without an error");
     app.insert_resource(CaptureUploadBudget { bytes_per_frame: 64 << 10 });
     let entity = spawn(&mut app, synthetic(5000, 9, true), Playback::default());
@@ -424,7 +400,7 @@ fn a_capture_plays_from_its_first_picture_on() {
 fn a_rejected_replacement_keeps_the_previous_capture() {
     let Some(mut app) = app(SIZE) else { return };
     let entity = spawn(&mut app, heap(1, Vec3::X), Playback::paused_at(0.0));
-    let camera = spawn_camera(&mut app, Msaa::Off, eye());
+    let camera = spawn_camera(&mut app, Msaa::Off, synthetic_eye());
     let before = picture(&mut app, 0.0);
     let messages = (messages_of::<CaptureReady>(&mut app), messages_of::<CaptureFailed>(&mut app));
     let said = || (count_about(&messages.0, entity), count_about(&messages.1, entity));
@@ -444,7 +420,7 @@ fn a_rejected_replacement_keeps_the_previous_capture() {
 fn a_replaced_scene_is_shown_without_a_gap() {
     let Some(mut app) = app(SIZE) else { return };
     let entity = spawn(&mut app, heap(1, Vec3::X), Playback::paused_at(0.0));
-    spawn_camera(&mut app, Msaa::Off, eye());
+    spawn_camera(&mut app, Msaa::Off, synthetic_eye());
     testing::settle(&mut app).expect("the app draws without an error");
     // The pixel in the middle, frame by frame.
     let seen = Arc::new(Mutex::new(Vec::new()));
@@ -523,7 +499,7 @@ fn every_frame_after_a_camera_cut_has_all_splats() {
 fn a_restart_of_the_renderer_recreates_all_resources() {
     let Some(mut app) = app(SIZE) else { return };
     spawn(&mut app, synthetic(2000, 3, true), Playback::paused_at(0.7));
-    let camera = spawn_camera(&mut app, Msaa::Off, eye());
+    let camera = spawn_camera(&mut app, Msaa::Off, synthetic_eye());
     let depth = CaptureViewSettings { depth: DepthWrite::Expected, ..default() };
     app.world_mut().entity_mut(camera).insert(depth);
     let before = picture(&mut app, 0.0);
@@ -537,7 +513,7 @@ fn a_restart_of_the_renderer_recreates_all_resources() {
     assert!(before == after, "the picture is as before");
     assert_eq!(statistics(&app).renderer_missing(), None, "the renderer is available");
     assert_eq!(statistics(&app).uploaded_captures(), 1, "the capture is uploaded only once");
-    check_pipelines(&app);
+    check_pipelines(&app).expect("every pipeline compiles");
 }
 
 #[test]
@@ -549,12 +525,12 @@ fn captures_are_drawn_again_after_a_lost_device() {
     let mut app = testing::app_with(SIZE, |plugins| plugins.disable::<PbrPlugin>());
     app.add_plugins(GaussianCapturePlugins).insert_resource(ClearColor(Color::BLACK));
     app.insert_resource(RenderErrorHandler(|error, _, _| match error.ty {
-        ErrorType::DeviceLost => RenderErrorPolicy::Recover(RenderCreation::Automatic(Box::new(settings()))),
+        ErrorType::DeviceLost => RenderErrorPolicy::Recover(RenderCreation::Automatic(Box::new(device_settings()))),
         // Errors of work that was in progress when the device was lost.
         _ => RenderErrorPolicy::Ignore,
     }));
     spawn(&mut app, synthetic(2000, 3, true), Playback::paused_at(0.7));
-    spawn_camera(&mut app, Msaa::Off, eye());
+    spawn_camera(&mut app, Msaa::Off, synthetic_eye());
     let before = picture(&mut app, 0.0);
     assert!(before.pixels().any(|pixel| pixel.0[..3] != [0, 0, 0]), "the capture is drawn");
     // Until Bevy's own read-backs have ended, since they fail with a lost device.
@@ -573,28 +549,18 @@ fn captures_are_drawn_again_after_a_lost_device() {
     }
     let after = picture(&mut app, 0.0);
     assert!(before == after, "the picture is as before");
-    check_pipelines(&app);
+    check_pipelines(&app).expect("every pipeline compiles");
 }
 
 #[test]
 fn insufficient_gpu_limits_are_reported_and_captures_play() {
-    let Some(mut large) = app(SIZE) else { return };
-    testing::settle(&mut large).expect("the app draws without an error");
-    let limits = large.sub_app(RenderApp).world().resource::<RenderDevice>().limits();
-    drop(large);
-    // Enough for Bevy, but not for the renderer.
-    let limits = WgpuLimits { max_compute_workgroup_storage_size: 8192, ..limits };
-    let settings = WgpuSettings { constrained_limits: Some(limits), ..settings() };
-    let mut app = testing::app_with(SIZE, |plugins| {
-        plugins.set(RenderPlugin {
-            render_creation: RenderCreation::Automatic(Box::new(settings)),
-            synchronous_pipeline_compilation: true,
-            ..default()
-        })
+    let limited = limited_app(SIZE, |settings, limits| {
+        // Enough for Bevy, but not for the renderer.
+        settings.constrained_limits = Some(WgpuLimits { max_compute_workgroup_storage_size: 8192, ..limits });
     });
-    app.add_plugins(GaussianCapturePlugins).insert_resource(ClearColor(Color::BLACK));
+    let Some(mut app) = limited else { return };
     let entity = spawn(&mut app, heap(1, Vec3::X), Playback::default());
-    spawn_camera(&mut app, Msaa::Off, eye());
+    spawn_camera(&mut app, Msaa::Off, synthetic_eye());
     let failures = failures_of(&mut app);
     let picture = picture(&mut app, 0.25);
     assert!(picture.pixels().all(|pixel| pixel.0[..3] == [0, 0, 0]), "captures are not drawn");
@@ -623,7 +589,7 @@ fn inconsistent_captures_fail_and_valid_ones_are_drawn() {
     let mapped = RuntimeScene { environment: Some(map), ..heap(1, Vec3::Z) };
     let wrong = [filtered.clone(), mapped].map(|scene| spawn(&mut app, scene, Playback::paused_at(0.0)));
     spawn(&mut app, heap(1, Vec3::X), Playback::paused_at(0.0));
-    spawn_camera(&mut app, Msaa::Off, eye());
+    spawn_camera(&mut app, Msaa::Off, synthetic_eye());
     let picture = picture(&mut app, 0.0);
     let [r, g, b, _] = picture.get_pixel(SIZE.x / 2, SIZE.y / 2).0;
     assert!(r > 200 && g < 60 && b < 60, "the valid capture is drawn: {r}, {g}, {b}");

@@ -1,8 +1,8 @@
 //! Two eyes in Bevy apps without a window: their disparity, and their pictures compared to single cameras.
 //!
-//! In: small scenes made by hand, heads with two eyes. Out: proof that the disparity is that of pinhole cameras, that both eyes' pictures
-//! equal pictures of single cameras at the same time, and that halves of one target equal two targets. Skipped without a GPU; a software
-//! driver is enough.
+//! In: small scenes made by hand, heads with two eyes. Out: proof that the disparity is that of pinhole cameras, that
+//! both eyes' pictures equal pictures of single cameras at the same time, and that halves of one target equal two
+//! targets. Skipped without a GPU; a software driver is enough.
 
 use crate::support::blob::blob;
 use crate::support::cpu_reference::{DURATION, SIZE, add, difference_between, scene};

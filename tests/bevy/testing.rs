@@ -1,8 +1,9 @@
-//! The module `testing`: time without pictures, keys, cameras of the window, pictures in HDR, and errors for apps without a required
-//! plugin.
+//! The module `testing`: time without pictures, keys, cameras of the window, pictures in HDR, and errors for apps
+//! without a required plugin.
 //!
-//! In: apps with and without a renderer. Out: proof that the game's systems receive time and keys as in a game, and that a picture contains
-//! the content of the window. Tests that draw are skipped without a GPU; a software driver is enough.
+//! In: apps with and without a renderer. Out: proof that the game's systems receive time and keys as in a game, and
+//! that a picture contains the content of the window. Tests that draw are skipped without a GPU; a software driver is
+//! enough.
 
 use crate::support::cpu_reference::{SIZE, add, rgb};
 use crate::support::fixtures::{MIDDLE, crowd, front, lone, spawn};

@@ -1,7 +1,7 @@
 //! Timelines in Bevy apps: clips, markers, scrubbing, files that change and files that are broken.
 //!
-//! In: timelines made in code and written to a folder. Out: proof that every track shows the clip of the current time, whether the time was
-//! reached by playing or by seeking. Needs neither a GPU nor a window.
+//! In: timelines made in code and written to a folder. Out: proof that every track shows the clip of the current time,
+//! whether the time was reached by playing or by seeking. Needs neither a GPU nor a window.
 
 use crate::support::event_log::{debug, take_events};
 use crate::support::playback_app::{self, app, app_with, capture, change, get, pass};
@@ -276,7 +276,7 @@ fn another_timeline_on_the_same_player_starts_at_the_current_time() {
 /// Returns a folder with a capture `two.gs4d` of two seconds.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    offline::save(&folder.path().join("two.gs4d"), &playback_app::scene(2.0, 4), &WriteSettings::default())
+    offline::work::save(&folder.path().join("two.gs4d"), &playback_app::scene(2.0, 4), &WriteSettings::default())
         .expect("saved");
     folder
 }

@@ -1,9 +1,10 @@
-//! Views of captures in Bevy apps: environment maps, sub views, shared and resized targets, reverse playback, and comparison with the
-//! command.
+//! Views of captures in Bevy apps: environment maps, sub views, shared and resized targets, reverse playback, and
+//! comparison with the command.
 //!
-//! In: small scenes made by hand, synthetic scenes and the bundled capture, in headless apps. Out: proof that environment maps follow the
-//! settings of their captures and have no holes, that sub views and parts of targets match the CPU reference, that temporal filters and the
-//! direction of playback change no pixel, and that extreme values stay finite. Skipped without a GPU; a software driver is enough.
+//! In: small scenes made by hand, synthetic scenes and the bundled capture, in headless apps. Out: proof that
+//! environment maps follow the settings of their captures and have no holes, that sub views and parts of targets match
+//! the CPU reference, that temporal filters and the direction of playback change no pixel, and that extreme values stay
+//! finite. Skipped without a GPU; a software driver is enough.
 
 use crate::support::blob::blob;
 use crate::support::cpu_reference::{
@@ -128,8 +129,8 @@ fn apart(picture: &Picture, expected: &Picture) -> f32 {
 
 #[test]
 fn a_sub_view_equals_its_part_of_the_whole_picture() {
-    // The borders of the part are borders of tiles or of the picture: a splat ends at the last tile that its three standard deviations
-    // touch.
+    // The borders of the part are borders of tiles or of the picture: a splat ends at the last tile that its three
+    // standard deviations touch.
     let (offset, size) = (UVec2::new(112, 32), UVec2::new(88, 96));
     let Some(mut app) = app(size) else { return };
     let Some(mut headless) = gpu::headless() else { return };
@@ -271,7 +272,8 @@ impl Both {
         }
     }
 
-    /// Checks that both cameras draw the same picture and, if filters are on, that the first camera has inactive Gaussians.
+    /// Checks that both cameras draw the same picture and, if filters are on, that the first camera has inactive
+    /// Gaussians.
     fn check(&mut self, what: &str, filters: bool) {
         let filtered = picture(&mut self.app, 0.0);
         let plain = testing::read(&mut self.app, &self.plain).expect("the second camera's picture");

@@ -2,14 +2,12 @@
 //!
 //! In: a small synthetic scene and a dataset drawn from it by the CPU reference. Out: proof that the package is smaller
 //! and both reports are written, that finished stages are not repeated, and that data of another capture and paths that
-//! cannot be written are refused; that a package has at most the requested size or is not written, and that an impossible size is refused
-//! before scoring.
+//! cannot be written are refused; that a package has at most the requested size or is not written, and that an
+//! impossible size is refused before scoring.
 
 use crate::support::capture::Capture;
-use crate::support::command::{Run, arguments, gs4d};
+use crate::support::command::{Run, arguments, gs4d, has_gpu};
 use crate::support::folders;
-use crate::support::no_gpu::no_gpu;
-use bevy_gs4d::renderer::GpuContext;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{Environment, GaussianScene};
 use glam::{UVec2, Vec3};
@@ -48,15 +46,16 @@ impl Capture {
         number_after(&refused.err, "without Gaussians has ")
     }
 
-    /// Returns the bytes of a package of the Gaussian with the highest score, which the error of a bake names if only an empty package
-    /// fits.
+    /// Returns the bytes of a package of the Gaussian with the highest score, which the error of a bake names if only
+    /// an empty package fits.
     fn bytes_of_one(&self) -> u64 {
         let refused = self.bake_to_size(self.bytes_of_none() as f64 + 0.5, &[]);
         refused.must_fail("a single Gaussian has ");
         number_after(&refused.err, "a single Gaussian has ")
     }
 
-    fn left(&self) -> Vec<String> {
+    /// Returns the names in the folder.
+    pub fn left(&self) -> Vec<String> {
         folders::names(self.folder.path())
     }
 }
@@ -169,12 +168,12 @@ fn change_image(capture: &Capture, name: &str) {
 #[test]
 fn a_changed_image_reruns_the_stages_that_depend_on_it() {
     let capture = capture(Vec3::ZERO, true);
-    let (out, has_gpu) = (capture.out(), GpuContext::headless(None).is_ok());
-    let engine = if has_gpu { "gpu" } else { "cpu" };
+    let (out, on_gpu) = (capture.out(), has_gpu());
+    let engine = if on_gpu { "gpu" } else { "cpu" };
     let bake = || {
         let fixed = arguments!["bake", &capture.scene, "--data", &capture.data, "-o", &out, "--keep-work"];
         let more = arguments!["--ratio", "0.5", "--engine", engine];
-        let trained = if has_gpu { arguments!["--steps", "4", "--rounds", "2"].to_vec() } else { Vec::new() };
+        let trained = if on_gpu { arguments!["--steps", "4", "--rounds", "2"].to_vec() } else { Vec::new() };
         let run = gs4d(&[fixed.to_vec(), more.to_vec(), trained].concat());
         assert_eq!(run.code, Some(0), "the command succeeds: {}", run.err);
         let reran = |stage: &&str| {
@@ -184,7 +183,7 @@ fn a_changed_image_reruns_the_stages_that_depend_on_it() {
         ["score", "prune", "rounds", "fine-tune", "mask", "compress"].into_iter().filter(reran).collect::<Vec<_>>()
     };
     let trained = ["rounds", "fine-tune", "mask", "compress"];
-    let with = |stages: &[&'static str]| if has_gpu { [stages, &trained].concat() } else { stages.to_vec() };
+    let with = |stages: &[&'static str]| if on_gpu { [stages, &trained].concat() } else { stages.to_vec() };
     let first = bake();
     assert!(first.starts_with(&["score", "prune"]), "every stage runs at first: {first:?}");
     assert_eq!(bake(), [""; 0], "no stage runs again without a change");
@@ -310,7 +309,8 @@ fn a_package_that_stays_too_large_is_kept_in_the_work_folder() {
     let out = capture.out();
     let one = capture.bytes_of_one();
     fs::write(&out, b"the old package").expect("the folder can be written to");
-    // The count is found with the support filter; the name of the key-frame filter is longer, so that not even one Gaussian fits.
+    // The count is found with the support filter; the name of the key-frame filter is longer, so that not even one
+    // Gaussian fits.
     let run = capture.bake_to_size(one as f64 + 0.5, &["--filter", "key-frame"]);
     run.must_fail("does not fit");
     run.must_fail("not even with a single Gaussian");
@@ -370,9 +370,9 @@ fn parts_shared_by_all_gaussians_count_once_for_the_target_size() {
 }
 
 #[test]
-fn what_a_later_stage_would_refuse_is_refused_before_the_training() {
-    if GpuContext::headless(None).is_err() {
-        return no_gpu();
+fn inputs_that_a_later_stage_would_refuse_are_refused_before_training() {
+    if !has_gpu() {
+        return;
     }
     let scene = synthesize(&SynthSettings { count: 200, ..SynthSettings::default() });
     // Too few cameras and times to hold some out unasked.
@@ -411,8 +411,8 @@ fn invalid_sizes_and_rounds_are_refused() {
 
 #[test]
 fn with_training_scores_are_compared_after_training_and_pruning_may_take_rounds() {
-    if GpuContext::headless(None).is_err() {
-        return no_gpu();
+    if !has_gpu() {
+        return;
     }
     let capture = capture(Vec3::ZERO, true);
     let out = capture.out();

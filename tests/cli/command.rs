@@ -1,7 +1,8 @@
-//! The `gs4d` command, run as a user runs it: inspecting captures, converting them, all errors of a command line, closed pipes.
+//! The `gs4d` command, run as a user runs it: inspecting captures, converting them, all errors of a command line,
+//! closed pipes.
 //!
-//! In: command lines, intact and damaged files. Out: proof that exit codes, reports and written files are right, and that no command
-//! panics.
+//! In: command lines, intact and damaged files. Out: proof that exit codes, reports and written files are right, and
+//! that no command panics.
 
 use crate::support::command::{arguments, folder, gs4d, scene};
 use crate::support::package_parts::Parts;
@@ -159,7 +160,7 @@ fn training_options_are_refused_for_a_package() {
 }
 
 #[test]
-fn options_that_no_table_supports_are_experimental() {
+fn options_without_a_measured_benefit_are_listed_as_experimental() {
     let help = gs4d(&["finetune", "--help"]).text();
     let (_, part) = help.split_once("\nExperimental:\n").expect("the heading");
     let lines = part.lines().take_while(|line| line.is_empty() || line.starts_with(' '));

@@ -1,6 +1,7 @@
 //! `gs4d compare`, run as a user runs it.
 //!
-//! In: pictures of known values. Out: proof that the numbers are right and that pictures that cannot be compared are named.
+//! In: pictures of known values. Out: proof that the numbers are right and that pictures that cannot be compared are
+//! named.
 
 use crate::support::command::{arguments, folder, gs4d};
 use bevy_gs4d::view::Picture;

@@ -18,7 +18,7 @@ fn changed(folder: &TempDir, name: &str, change: impl FnOnce(&mut Trained)) -> P
     let mut scene = synthesize(&SynthSettings { count: 300, degree: 1, ..SynthSettings::default() });
     let SceneForm::Trained(trained) = &mut scene.form else { panic!("synthetic scenes are trained") };
     change(trained);
-    offline::save(&path, &scene, &WriteSettings::default()).expect("the folder can be written to");
+    offline::work::save(&path, &scene, &WriteSettings::default()).expect("the folder can be written to");
     path
 }
 

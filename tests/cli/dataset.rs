@@ -1,15 +1,13 @@
 //! `info` on the folders of datasets.
 //!
-//! In: small datasets. Out: proof that counts, splits, missing files and what was assumed are shown, that cameras are drawn, and that wrong folders are
-//! refused.
+//! In: small datasets. Out: proof that counts, splits, missing files and assumptions are shown, that cameras are drawn,
+//! and that wrong folders are refused.
 
 use crate::support::capture::Capture;
-use crate::support::command::{arguments, folder, gs4d, scene};
-use crate::support::no_gpu::no_gpu;
+use crate::support::command::{arguments, folder, gs4d, has_gpu, scene};
 use bevy_gs4d::codec::package::WriteSettings;
 use bevy_gs4d::codec::{self, ReadOptions};
 use bevy_gs4d::offline;
-use bevy_gs4d::renderer::GpuContext;
 use bevy_gs4d::scene::Origin;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use glam::{UVec2, Vec3};
@@ -103,7 +101,7 @@ fn write_colmap(folder: &Path, names: [&str; 2]) {
 }
 
 #[test]
-fn what_was_assumed_of_a_dataset_is_shown() {
+fn assumptions_about_a_dataset_are_shown() {
     let folder = folder();
     let data = folder.path().join("data");
     write_colmap(&data, ["day", "night"]);
@@ -119,7 +117,7 @@ fn what_was_assumed_of_a_dataset_is_shown() {
 }
 
 #[test]
-fn what_was_assumed_of_a_dataset_is_a_note_of_each_command() {
+fn assumptions_about_a_dataset_are_noted_by_each_command() {
     let folder = folder();
     let data = folder.path().join("data");
     write_colmap(&data, ["cam0", "cam1"]);
@@ -135,7 +133,8 @@ fn what_was_assumed_of_a_dataset_is_a_note_of_each_command() {
 /// A place in coordinates of UTM, and a time in seconds since 1970.
 const FAR: Origin = Origin { place: [500_000.0, 5_400_000.0, 300.0], time: 1_700_000_000.0 };
 
-/// Returns a capture of a synthetic scene, whose dataset is moved to [`FAR`], and the path of the scene with this origin.
+/// Returns a capture of a synthetic scene, whose dataset is moved to [`FAR`], and the path of the scene with this
+/// origin.
 fn far_capture() -> (Capture, std::path::PathBuf) {
     let mut trained = synthesize(&SynthSettings { count: 400, ..SynthSettings::default() });
     let capture = Capture::new(trained.clone(), Vec3::ZERO, 3, 3, UVec2::splat(48), true);
@@ -154,7 +153,7 @@ fn far_capture() -> (Capture, std::path::PathBuf) {
     }
     trained.trained_with.origin = FAR;
     let scene = capture.path("far.gs4d");
-    offline::save(&scene, &trained, &WriteSettings::default()).expect("the folder can be written to");
+    offline::work::save(&scene, &trained, &WriteSettings::default()).expect("the folder can be written to");
     (capture, scene)
 }
 
@@ -178,8 +177,8 @@ fn datasets_far_from_0_are_read_from_the_origin_of_the_scene() {
     for part in ["500000, 5400000, 302", "1700000000"] {
         assert!(notes.contains(part), "{part:?} is not in: {notes}");
     }
-    if GpuContext::headless(None).is_err() {
-        return no_gpu();
+    if !has_gpu() {
+        return;
     }
     let (cameras, out) = (capture.data.join("transforms_test.json"), capture.path("pictures"));
     let run = gs4d(&arguments!["render", &scene, "--cameras", &cameras, "--out", &out]);
@@ -189,8 +188,7 @@ fn datasets_far_from_0_are_read_from_the_origin_of_the_scene() {
 
 #[test]
 fn a_capture_of_a_dataset_far_from_0_has_an_origin() {
-    if GpuContext::headless(None).is_err() {
-        no_gpu();
+    if !has_gpu() {
         return;
     }
     let (capture, _) = far_capture();
@@ -198,7 +196,7 @@ fn a_capture_of_a_dataset_far_from_0_has_an_origin() {
     let command = arguments!["train", "--data", &capture.data, "-o", &out, "--gaussians", "50", "--sh-degree", "0"];
     let more = ["--steps", "2", "--validation", "none", "--time-interval", "1700000000,1700000002", "--json"];
     let run = gs4d(&[command.to_vec(), more.map(Into::into).to_vec()].concat());
-    assert_eq!(run.err.matches("500000, 5400000, 302").count(), 1, "the place is said once: {}", run.err);
+    assert_eq!(run.err.matches("500000, 5400000, 302").count(), 1, "the origin is noted once: {}", run.err);
     assert_eq!(run.json()["time_interval"], json!([0.0, 2.0]), "an interval of the dataset, counted from its origin");
     let found = codec::load(&out, &ReadOptions::default()).expect("a package").trained_with;
     let expected = Origin { place: [500_000.0, 5_400_000.0, 302.0], ..FAR };

@@ -1,18 +1,17 @@
 //! `gs4d detail`, run as a user runs it.
 //!
-//! In: a small synthetic scene. Out: proof that the package has the levels that the report names, that `gs4d render` draws each level as the
-//! plugin does, that verbs which change a scene report that levels are left out, and that datasets which do not show the scene and a size without
-//! a dataset are refused. Skipped where there is no GPU.
+//! In: a small synthetic scene. Out: proof that the package has the levels that the report names, that `gs4d render`
+//! draws each level as the plugin does, that verbs which change a scene report that levels are left out, and that
+//! datasets which do not show the scene and a size without a dataset are refused. Skipped where there is no GPU.
 
 use crate::support::capture::Capture;
-use crate::support::command::{Run, arguments, folder, gs4d, scene};
+use crate::support::command::{Run, arguments, folder, gs4d, has_gpu, scene};
 use crate::support::folders::contents;
 use crate::support::no_gpu::no_gpu;
 use bevy_gs4d::codec::{self, ReadOptions};
+use bevy_gs4d::offline::draw::orbit;
 use bevy_gs4d::offline::engine::GpuSettings;
-use bevy_gs4d::offline::metrics::SquaredError;
-use bevy_gs4d::offline::orbit::orbit;
-use bevy_gs4d::renderer::GpuContext;
+use bevy_gs4d::offline::measure::SquaredError;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::view::Picture;
 use glam::{UVec2, Vec3};
@@ -26,8 +25,7 @@ const QUICK: [&str; 11] =
 
 #[test]
 fn levels_are_written_reported_and_left_out_by_other_verbs() {
-    if GpuContext::headless(None).is_err() {
-        no_gpu();
+    if !has_gpu() {
         return;
     }
     let folder = folder();
@@ -138,8 +136,8 @@ fn blacken(folder: &Path) {
 
 #[test]
 fn datasets_that_do_not_show_the_capture_are_refused() {
-    if GpuContext::headless(None).is_err() {
-        return no_gpu();
+    if !has_gpu() {
+        return;
     }
     let capture = |images| {
         let trained = synthesize(&SynthSettings { count: 400, ..SynthSettings::default() });

@@ -1,8 +1,8 @@
 //! `gs4d eval` and `gs4d ablate`, run as a user runs them, on pictures of the scene itself.
 //!
 //! In: a small synthetic scene and a dataset drawn from it by the CPU reference. Out: proof that the scene matches its
-//! own pictures, that figures over any background equal an independent composite, that identical views are counted, that
-//! missing data is named, and that the tables have the documented rows and columns.
+//! own pictures, that figures over any background equal an independent composite, that identical views are counted,
+//! that missing data is named, and that the tables have the documented rows and columns.
 
 use crate::support::capture::Capture;
 use crate::support::command::{arguments, gs4d};

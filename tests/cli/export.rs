@@ -1,7 +1,7 @@
 //! `export`, and the commands that open what it writes.
 //!
-//! In: a small synthetic scene. Out: proof that files and folders have the names, the contents and the report that the options ask for, and that
-//! options without an effect and files of other sequences are refused.
+//! In: a small synthetic scene. Out: proof that files and folders have the names, the contents and the report that the
+//! options ask for, and that options without an effect and files of other sequences are refused.
 
 use crate::support::command::{arguments, folder, gs4d, scene};
 use crate::support::folders::contents;
@@ -87,7 +87,7 @@ fn a_sequence_is_a_folder_that_opens_as_one_capture() {
 }
 
 #[test]
-fn the_axis_that_points_up_is_said_and_comes_back() {
+fn the_up_axis_is_noted_and_comes_back() {
     let folder = folder();
     let scene = scene(&folder, "60");
     let [still, moving, frames] = ["still.ply", "moving.ftgs.ply", "frames"].map(|name| folder.path().join(name));
@@ -96,7 +96,7 @@ fn the_axis_that_points_up_is_said_and_comes_back() {
     for (out, more) in cases {
         let more: Vec<OsString> = more.iter().map(Into::into).collect();
         let text = gs4d(&[arguments!["export", &scene, out].to_vec(), more].concat()).text();
-        assert_eq!(text.matches("+z points up").count(), 1, "{}: it is said once: {text}", out.display());
+        assert_eq!(text.matches("+z points up").count(), 1, "{}: the up axis is noted once: {text}", out.display());
         let info = gs4d(&arguments!["info", out, "--json"]).json();
         assert_eq!(info["switches"]["playback"]["up"], "pos_z", "{}: the axis of the capture", out.display());
     }

@@ -1,22 +1,20 @@
-//! Faults while a verb writes: killed at any moment, a folder that cannot be written to, a full disk (by the limits of a shell, and in truth), closed
-//! pipes, two runs at once.
+//! Faults while a verb writes: killed at any moment, a folder that cannot be written to, a full disk (by a limit of the
+//! shell, and on a full file system), closed pipes, two runs at once.
 //!
-//! In: every verb that writes, on small inputs made here. Out: proof that inputs are unchanged, that an output is absent, unchanged
-//! or complete and readable, and that the next run without a fault leaves no other files. Verbs that need a GPU are skipped where there is
-//! none.
+//! In: every verb that writes, on small inputs made here. Out: proof that inputs are unchanged, that an output is
+//! absent, unchanged or complete and readable, and that the next run without a fault leaves no other files. Verbs that
+//! need a GPU are skipped where there is none.
 //!
 //! `GS4D_KILLS` is how often each verb is killed, for long runs: 4 times if it is not set.
 
-use crate::support::command::{GS4D, Run, arguments, gs4d};
+use crate::support::command::{GS4D, Run, arguments, gs4d, has_gpu};
 use crate::support::dataset;
 use crate::support::folders::{contents, names};
-use crate::support::no_gpu::no_gpu;
 use crate::support::random::Random;
 use crate::support::skip::skip;
 use bevy_gs4d::codec::package::{self, WriteSettings};
 use bevy_gs4d::internal::codec::read_bytes;
 use bevy_gs4d::offline;
-use bevy_gs4d::renderer::GpuContext;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use glam::{UVec2, Vec3};
 use serde_json::Value;
@@ -164,7 +162,7 @@ fn on_data(verb: &str, from: &Path) -> Vec<OsString> {
 /// Inputs, and folders for outputs.
 struct Stage {
     folder: TempDir,
-    /// The checksum of each input.
+    /// The contents of each input.
     inputs: BTreeMap<PathBuf, Vec<u8>>,
 }
 
@@ -183,7 +181,7 @@ impl Stage {
         let scene = synthesize(&SynthSettings { count: COUNT, ..SynthSettings::default() });
         let runtime = scene.clone().into_runtime().expect("a synthetic scene can be drawn");
         dataset::write(&from.join("data"), &runtime, Vec3::ZERO, 2, 3, UVec2::splat(48), true);
-        offline::save(&from.join("scene.gs4d"), &scene, &WriteSettings::default()).expect("the folder is there");
+        offline::work::save(&from.join("scene.gs4d"), &scene, &WriteSettings::default()).expect("the folder is there");
         let scores: Vec<u8> = (0..COUNT).flat_map(|at| (at as f32).to_le_bytes()).collect();
         fs::write(from.join("scores.f32"), scores).expect("the folder can be written to");
         let inputs = contents(&from);
@@ -192,10 +190,7 @@ impl Stage {
 
     /// Returns every verb that this machine can run.
     fn acts(&self) -> impl Iterator<Item = Act<'_>> {
-        let gpu = GpuContext::headless(None).is_ok();
-        if !gpu {
-            no_gpu();
-        }
+        let gpu = has_gpu();
         let possible = VERBS.into_iter().filter(move |verb| gpu || !verb.needs_gpu);
         possible.map(move |verb| {
             let out = self.folder.path().join(verb.name);
@@ -231,8 +226,8 @@ impl Act<'_> {
         command
     }
 
-    /// Returns the command with its outputs on a file system of its own, in memory, of which `free` bytes are free. It begins with the files of the
-    /// folder for outputs; its files are copied back there.
+    /// Returns the command with its outputs on a file system of its own, in memory, of which `free` bytes are free. It
+    /// begins with the files of the folder for outputs; its files are copied back there.
     fn on_full_system(&self, free: u64) -> Command {
         const SCRIPT: &str = "full=$1 old=$2 free=$3; shift 3
             mount -t tmpfs -o size=1m none \"$full\" && cp \"$old\"/* \"$full\" || exit 1
@@ -308,7 +303,8 @@ impl Act<'_> {
     }
 }
 
-/// Returns a command that runs another, given by its arguments, which may mount file systems: they end with it.
+/// Returns a command that runs the command in its arguments in a mount namespace of its own: file systems that it
+/// mounts end with it.
 fn own_mounts() -> Command {
     let mut command = Command::new("unshare");
     command.args(["--user", "--map-root-user", "--mount"]);
@@ -401,7 +397,8 @@ fn a_full_disk_is_named_and_the_old_output_stays() {
         act.run_well("at first");
         let size = |file: &&str| fs::metadata(act.out.join(file)).expect("the file exists").len();
         let largest = act.verb.files.iter().map(size).max();
-        // Blocks of 512 bytes or of 1024: full from the start, and in the middle of a file. Drivers of GPUs may keep memory in files.
+        // Blocks of 512 bytes or of 1024: full from the start, and in the middle of a file. Drivers of GPUs may keep
+        // memory in files.
         let limits: &[&str] = match largest {
             _ if act.verb.needs_gpu => &[],
             Some(4097..) => &["0", "4"],

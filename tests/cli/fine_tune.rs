@@ -1,58 +1,43 @@
 //! `gs4d finetune`, run as a user runs it, on pictures of the scene itself.
 //!
-//! In: a small synthetic scene, a dataset drawn from it, the scene pruned. Out: proof that training raises quality, that the result can be
-//! compressed in the same run, that the report of a compressed or interrupted run has no value that was not measured, and that wrong inputs
-//! are refused and leave no files. Skipped where there is no GPU.
+//! In: a small synthetic scene, a dataset drawn from it, the scene pruned. Out: proof that training raises quality,
+//! that the result can be compressed in the same run, that the report of a compressed or interrupted run has no value
+//! that was not measured, and that wrong inputs are refused and leave no files. Skipped where there is no GPU.
 
 use crate::support::capture::Capture;
-use crate::support::command::{GS4D, Run, arguments, gs4d};
-use crate::support::no_gpu::no_gpu;
-use crate::support::{dataset, folders};
-use bevy_gs4d::renderer::GpuContext;
+use crate::support::command::{GS4D, Run, arguments, gs4d, has_gpu};
+use crate::support::dataset;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use glam::{UVec2, Vec3};
 use serde_json::Value;
 use std::ffi::OsString;
 use std::fs;
 use std::path::PathBuf;
-use tempfile::TempDir;
 
 struct Lesson {
-    folder: TempDir,
-    scene: PathBuf,
+    capture: Capture,
+    /// The path of the pruned scene.
     pruned: PathBuf,
-    data: PathBuf,
 }
 
 /// Returns a scene, the pruned scene and the pictures of the scene; `None` if there is no GPU.
 fn lesson() -> Option<Lesson> {
-    if GpuContext::headless(None).is_err() {
-        no_gpu();
+    if !has_gpu() {
         return None;
     }
     let trained = synthesize(&SynthSettings { count: 1000, ..SynthSettings::default() });
-    let Capture { folder, scene, data } = Capture::new(trained, Vec3::ZERO, 4, 4, UVec2::splat(48), true);
-    let pruned = folder.path().join("pruned.gs4d");
-    gs4d(&arguments!["prune", &scene, "--data", &data, "--ratio", "0.5", "--variant", "energy", "-o", &pruned]).text();
-    Some(Lesson { folder, scene, pruned, data })
-}
-
-impl Lesson {
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    fn left(&self) -> Vec<String> {
-        folders::names(self.folder.path())
-    }
+    let capture = Capture::new(trained, Vec3::ZERO, 4, 4, UVec2::splat(48), true);
+    let (scene, data, pruned) = (&capture.scene, &capture.data, capture.path("pruned.gs4d"));
+    gs4d(&arguments!["prune", scene, "--data", data, "--ratio", "0.5", "--variant", "energy", "-o", &pruned]).text();
+    Some(Lesson { capture, pruned })
 }
 
 #[test]
 fn training_raises_the_quality_of_a_pruned_scene() {
     let Some(lesson) = lesson() else { return };
-    let out = lesson.path("tuned.gs4d");
+    let out = lesson.capture.path("tuned.gs4d");
     let steps = ["--steps", "120", "--evaluate-every", "60", "--json"];
-    let command = arguments!["finetune", &lesson.pruned, "--data", &lesson.data, "-o", &out];
+    let command = arguments!["finetune", &lesson.pruned, "--data", &lesson.capture.data, "-o", &out];
     let json = gs4d(&[command.to_vec(), steps.map(Into::into).to_vec()].concat()).json();
     assert_eq!(
         (json["gaussians"].as_u64(), json["views"].as_u64()),
@@ -62,11 +47,11 @@ fn training_raises_the_quality_of_a_pruned_scene() {
     let (before, best) = (json["psnr_before"].as_f64(), json["best"]["psnr"].as_f64());
     assert!(best > before.map(|before| before + 2.0), "{best:?} dB after {before:?}");
     assert_eq!(json["curve"].as_array().map(Vec::len), Some(3), "three points: before, halfway, at the end");
-    assert_eq!(lesson.left(), ["data", "pruned.gs4d", "scene.gs4d", "tuned.gs4d"], "no state file is left");
+    assert_eq!(lesson.capture.left(), ["data", "pruned.gs4d", "scene.gs4d", "tuned.gs4d"], "no state file is left");
     let info = gs4d(&arguments!["info", &out, "--json"]).json();
     assert_eq!((info["gaussians"].as_u64(), info["form"].as_str()), (Some(500), Some("trained")), "{info}");
-    let small = lesson.path("small.gs4d");
-    let command = arguments!["finetune", &out, "--data", &lesson.data, "-o", &small];
+    let small = lesson.capture.path("small.gs4d");
+    let command = arguments!["finetune", &out, "--data", &lesson.capture.data, "-o", &small];
     let coded = ["--steps", "4", "--compress", "balanced", "--compress-steps", "10", "--json"];
     let terms = ["--motion-weight", "--rigid-weight", "--opacity-weight"];
     let terms = terms.into_iter().flat_map(|term| [term, "1e-6"]).map(Into::into).collect();
@@ -74,7 +59,8 @@ fn training_raises_the_quality_of_a_pruned_scene() {
     let info = gs4d(&arguments!["info", &small, "--json"]).json();
     assert_eq!((info["gaussians"].as_u64(), info["form"].as_str()), (Some(500), Some("packed")), "{info}");
     let psnr = |scene: &PathBuf| {
-        let found = gs4d(&arguments!["eval", scene, "--data", &lesson.data, "--metrics", "psnr", "--json"]).json();
+        let found =
+            gs4d(&arguments!["eval", scene, "--data", &lesson.capture.data, "--metrics", "psnr", "--json"]).json();
         found["mean"]["psnr"].as_f64().expect("a number")
     };
     assert!(psnr(&small) > psnr(&lesson.pruned) + 1.0, "the compressed result is better than the pruned scene");
@@ -83,9 +69,10 @@ fn training_raises_the_quality_of_a_pruned_scene() {
 #[test]
 fn the_report_of_a_compressed_run_has_no_loss_of_the_compressed_scene() {
     let Some(lesson) = lesson() else { return };
-    let out = lesson.path("out.gs4d");
+    let out = lesson.capture.path("out.gs4d");
     for (quality, form) in [("visually-lossless", "packed"), ("lossless", "runtime")] {
-        let command = arguments!["finetune", &lesson.pruned, "--data", &lesson.data, "-o", &out, "--steps", "3"];
+        let command =
+            arguments!["finetune", &lesson.pruned, "--data", &lesson.capture.data, "-o", &out, "--steps", "3"];
         let command = [command.to_vec(), arguments!["--compress", quality].to_vec()].concat();
         let json = gs4d(&[&command[..], &["--json".into()]].concat()).json();
         let [first, trained, coded] = &json["curve"].as_array().expect("a curve")[..] else {
@@ -143,8 +130,9 @@ fn interrupted(command: &[OsString]) -> Run {
 #[test]
 fn the_report_of_an_interrupted_run_says_that_the_package_is_not_compressed() {
     let Some(lesson) = lesson() else { return };
-    let out = lesson.path("out.gs4d");
-    let command = arguments!["finetune", &lesson.pruned, "--data", &lesson.data, "-o", &out, "--steps", "1000000"];
+    let out = lesson.capture.path("out.gs4d");
+    let command =
+        arguments!["finetune", &lesson.pruned, "--data", &lesson.capture.data, "-o", &out, "--steps", "1000000"];
     let command =
         [command.to_vec(), arguments!["--evaluate-every", "1000000", "--compress", "small"].to_vec()].concat();
     let run = interrupted(&command);
@@ -172,45 +160,48 @@ fn the_report_of_an_interrupted_run_says_that_the_package_is_not_compressed() {
 #[test]
 fn invalid_inputs_of_training_are_refused_and_leave_no_files() {
     let Some(lesson) = lesson() else { return };
-    let out = lesson.path("out.gs4d");
-    let before = lesson.left();
-    let packed = lesson.path("packed.gs4d");
+    let out = lesson.capture.path("out.gs4d");
+    let before = lesson.capture.left();
+    let packed = lesson.capture.path("packed.gs4d");
     gs4d(&arguments!["compress", &lesson.pruned, &packed, "--verify", "0"]).text();
     let run = |scene: &PathBuf, data: &PathBuf| {
         gs4d(&arguments!["finetune", scene, "--data", data, "-o", &out, "--steps", "2"])
     };
-    run(&packed, &lesson.data).must_fail("trained form");
+    run(&packed, &lesson.capture.data).must_fail("trained form");
     fs::remove_file(&packed).expect("the file exists");
-    run(&lesson.pruned, &lesson.path("nowhere")).must_fail("nowhere");
-    gs4d(&arguments!["finetune", &lesson.pruned, "--data", &lesson.data, "-o", &lesson.pruned]).must_fail("itself");
-    let weighted = arguments!["finetune", &lesson.pruned, "--data", &lesson.data, "-o", &out, "--rigid-weight=-1"];
+    run(&lesson.pruned, &lesson.capture.path("nowhere")).must_fail("nowhere");
+    gs4d(&arguments!["finetune", &lesson.pruned, "--data", &lesson.capture.data, "-o", &lesson.pruned])
+        .must_fail("itself");
+    let weighted =
+        arguments!["finetune", &lesson.pruned, "--data", &lesson.capture.data, "-o", &out, "--rigid-weight=-1"];
     gs4d(&weighted).must_fail("--rigid-weight");
     // The images of another scene.
     let other = synthesize(&SynthSettings { count: 1000, seed: 9, ..SynthSettings::default() });
     let mut other = other.into_runtime().expect("the scene can be drawn");
     other.trained_with.background = [0.9, 0.8, 0.1];
-    let elsewhere = lesson.path("elsewhere");
+    let elsewhere = lesson.capture.path("elsewhere");
     dataset::write(&elsewhere, &other, Vec3::new(0.0, 0.0, 40.0), 4, 4, UVec2::splat(48), true);
     run(&lesson.pruned, &elsewhere).must_fail("do not show this capture");
     fs::remove_dir_all(&elsewhere).expect("the file exists");
-    let image = lesson.data.join("train/c01_02.png");
+    let image = lesson.capture.data.join("train/c01_02.png");
     fs::remove_file(&image).expect("the file exists");
-    run(&lesson.pruned, &lesson.data).must_fail("c01_02.png");
-    assert_eq!(lesson.left(), before, "no file is left");
-    assert!(lesson.scene.is_file(), "the scene exists");
+    run(&lesson.pruned, &lesson.capture.data).must_fail("c01_02.png");
+    assert_eq!(lesson.capture.left(), before, "no file is left");
+    assert!(lesson.capture.scene.is_file(), "the scene exists");
 }
 
 #[test]
-fn options_of_gaps_are_for_images_that_have_some() {
+fn options_for_gaps_need_images_with_gaps() {
     let Some(lesson) = lesson() else { return };
     let run = |out: &str| {
-        let command = arguments!["finetune", &lesson.pruned, "--data", &lesson.data, "-o", &lesson.path(out)];
+        let command =
+            arguments!["finetune", &lesson.pruned, "--data", &lesson.capture.data, "-o", &lesson.capture.path(out)];
         let more = ["--steps", "2", "--trust-images", "--mask-weight", "0.1", "--behind", "fixed"];
         gs4d(&[command.to_vec(), more.map(Into::into).to_vec()].concat())
     };
     run("out.gs4d")
         .must_fail("--mask-weight has no effect on images without transparent pixels and masks; leave it out");
-    let path = lesson.data.join("train/c01_02.png");
+    let path = lesson.capture.data.join("train/c01_02.png");
     let mut image = image::open(&path).expect("a picture").into_rgba8();
     image.get_pixel_mut(3, 4).0[3] = 200;
     image.save(&path).expect("the folder can be written to");

@@ -1,7 +1,8 @@
 //! `gs4d report`, run as a user runs it.
 //!
-//! In: small packages, with and without the reports of bakes, damaged, missing and unfinished ones. Out: proof that every package is listed with
-//! what is known of it, that the one that differs is marked, and that failures give the exit code and are named.
+//! In: small packages, with and without the reports of bakes, damaged, missing and unfinished ones. Out: proof that
+//! every package is listed with what is known of it, that the one that differs is marked, and that failures give the
+//! exit code and are named.
 
 use crate::support::command::{arguments, folder, gs4d, scene};
 use serde_json::{Value, json};

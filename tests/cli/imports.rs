@@ -1,15 +1,14 @@
 //! Commands that take a capture, on files of other makes.
 //!
-//! In: exports of a small synthetic scene, and pictures of one of them. Out: proof that `info`, `convert`, `compress`, `mask`, `bench` and `bake`
-//! take these files as they take packages, that a file whose Gaussians have windows of time is masked by these alone, that cameras with intrinsics see
-//! an import as it is, and that places on a map keep their digits.
+//! In: exports of a small synthetic scene, and pictures of one of them. Out: proof that `info`, `convert`, `compress`,
+//! `mask`, `bench` and `bake` take these files as they take packages, that a file whose Gaussians have windows of time
+//! is masked by these alone, that cameras with intrinsics see an import as it is, and that places on a map keep their
+//! digits.
 
-use crate::support::command::{arguments, folder, gs4d, scene};
+use crate::support::command::{arguments, folder, gs4d, has_gpu, scene};
 use crate::support::dataset;
-use crate::support::no_gpu::no_gpu;
 use bevy_gs4d::codec::{ReadOptions, load};
 use bevy_gs4d::reference;
-use bevy_gs4d::renderer::GpuContext;
 use bevy_gs4d::scene::{RuntimeScene, SceneForm};
 use bevy_gs4d::view::{Camera, Lens, RasterFov};
 use glam::{Mat4, UVec2, Vec2, Vec3, Vec4};
@@ -99,8 +98,8 @@ fn an_import_is_baked_with_its_pictures() {
 
 #[test]
 fn an_import_is_measured() {
-    if GpuContext::headless(None).is_err() {
-        return no_gpu();
+    if !has_gpu() {
+        return;
     }
     let folder = folder();
     for path in exports(&folder, &["a.spz", "a.sogst"]) {
@@ -177,7 +176,7 @@ fn places_on_a_map_keep_their_digits() {
     fs::write(&path, format!("{header}{properties}end_header\n{rows}")).expect("the folder can be written to");
 
     let shown = gs4d(&arguments!["info", &path]);
-    assert!(shown.err.contains("single precision has steps of 0.5 units"), "why is said: {}", shown.err);
+    assert!(shown.err.contains("single precision has steps of 0.5 units"), "the reason is stated: {}", shown.err);
     assert!(shown.text().contains("(500000, 5400001, 310)"), "the origin is shown");
     gs4d(&arguments!["convert", &path, &package]).text();
     let origin = info(&package)["switches"]["trained_with"]["origin"]["place"].clone();

@@ -1,16 +1,12 @@
-//! Killing `gs4d bake` and `gs4d finetune` at random moments.
+//! Killing `gs4d bake`, `finetune` and `train` at random moments.
 //!
-//! In: a small synthetic scene, its own pictures as a dataset, both commands killed (SIGKILL) after a random time and started again until they
-//! end. Out: proof that the package has the bytes of an uninterrupted run. `GS4D_KILLS` is the number of kills of each command, 4 unless
-//! `.ci/full` sets more. Skipped where there is no GPU.
+//! In: a small synthetic scene, its own pictures as a dataset, commands that are killed (SIGKILL) after a random time
+//! and started again until they end. Out: proof that the package has the bytes of an uninterrupted run. `GS4D_KILLS` is
+//! the number of kills of each command, 4 unless `.ci/full` sets more. Skipped where there is no GPU.
 
-use crate::support::capture::Capture;
-use crate::support::command::{arguments, gs4d};
-use crate::support::no_gpu::no_gpu;
+use crate::support::command::{arguments, gs4d, has_gpu};
 use crate::support::random::Random;
-use bevy_gs4d::renderer::GpuContext;
-use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
-use glam::{UVec2, Vec3};
+use crate::support::small_capture::small_capture;
 use std::ffi::OsString;
 use std::fs;
 use std::path::Path;
@@ -53,7 +49,8 @@ fn run_with_kills(command: &[OsString], longest: Duration, left: u32, random: &m
     unreachable!("the last run is not killed")
 }
 
-/// Kills and resumes a command that writes `out` until it has been killed as often as wanted, and compares the bytes with those of `whole`.
+/// Kills and resumes a command that writes `out` until it has been killed as often as wanted, and compares the bytes
+/// with those of `whole`.
 fn resumed_runs_equal(name: &str, command: &[OsString], out: &Path, others: &[&Path], seed: u64) {
     let start = Instant::now();
     gs4d(command).text();
@@ -75,11 +72,10 @@ fn resumed_runs_equal(name: &str, command: &[OsString], out: &Path, others: &[&P
 
 #[test]
 fn a_bake_killed_at_random_ends_at_the_same_bytes() {
-    if GpuContext::headless(None).is_err() {
-        return no_gpu();
+    if !has_gpu() {
+        return;
     }
-    let trained = synthesize(&SynthSettings { count: 300, degree: 1, ..SynthSettings::default() });
-    let capture = Capture::new(trained, Vec3::ZERO, 4, 3, UVec2::splat(32), true);
+    let capture = small_capture(300, 3);
     let out = capture.path("out.gs4d");
     let command = arguments![
         "bake",
@@ -105,11 +101,10 @@ fn a_bake_killed_at_random_ends_at_the_same_bytes() {
 
 #[test]
 fn a_fine_tuning_killed_at_random_ends_at_the_same_bytes() {
-    if GpuContext::headless(None).is_err() {
-        return no_gpu();
+    if !has_gpu() {
+        return;
     }
-    let trained = synthesize(&SynthSettings { count: 300, degree: 1, ..SynthSettings::default() });
-    let capture = Capture::new(trained, Vec3::ZERO, 4, 3, UVec2::splat(32), true);
+    let capture = small_capture(300, 3);
     let out = capture.path("out.gs4d");
     let command = arguments![
         "finetune",
@@ -134,11 +129,10 @@ fn a_fine_tuning_killed_at_random_ends_at_the_same_bytes() {
 
 #[test]
 fn a_training_from_pictures_alone_killed_at_random_ends_at_the_same_bytes() {
-    if GpuContext::headless(None).is_err() {
-        return no_gpu();
+    if !has_gpu() {
+        return;
     }
-    let trained = synthesize(&SynthSettings { count: 300, degree: 1, ..SynthSettings::default() });
-    let capture = Capture::new(trained, Vec3::ZERO, 4, 3, UVec2::splat(32), true);
+    let capture = small_capture(300, 3);
     let out = capture.path("out.gs4d");
     let command = arguments![
         "train",

@@ -1,9 +1,8 @@
 //! The `gs4d` command, run as a user runs it.
 //!
-//! In: command lines, scenes and datasets made here, and the trained captures if `GS4D_DATA` names their folder.
-//! Out: one test binary. The header of each module names the verbs that it tests.
+//! In: command lines, scenes and datasets made here, and the trained captures if `GS4D_DATA` names their folder. Out:
+//! one test binary. The header of each module names the verbs that it tests.
 
-mod advice;
 mod bake;
 mod command;
 mod compare;
@@ -51,4 +50,6 @@ mod support {
     #[cfg(target_os = "linux")]
     pub mod random;
     pub mod skip;
+    #[cfg(target_os = "linux")]
+    pub mod small_capture;
 }

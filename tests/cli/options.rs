@@ -1,12 +1,13 @@
 //! Options without an effect, of every verb.
 //!
-//! In: a table of command lines, whose files need not exist, command lines on captures and datasets made here, and the sentence that refuses each.
-//! Out: proof that an option that would be ignored is an error that names it, before any file is read if the command line tells it, and before
-//! anything is computed otherwise; that every option of every verb that `--help` lists is refused somewhere or always has an effect; and that the
-//! same sentence refuses packed captures in `compress` and `bake`.
+//! In: a table of command lines, whose files need not exist, command lines on captures and datasets made here, and the
+//! sentence that refuses each. Out: proof that an option that would be ignored is an error that names it, before any
+//! file is read if the command line tells it, and before anything is computed otherwise; that every option of every
+//! verb that `--help` lists is refused somewhere or always has an effect; and that the same sentence refuses packed
+//! captures in `compress` and `bake`.
 //!
-//! Options that describe the checkpoint (`--time-interval`, `--rotation-convention` and others of that group) are facts about a file, too: those that
-//! contradict a package are refused by the tests of `command`.
+//! Options that describe the checkpoint (`--time-interval`, `--rotation-convention` and others of that group) are facts
+//! about a file, too: those that contradict a package are refused by the tests of `command`.
 
 use crate::support::capture::Capture;
 use crate::support::command::{arguments, folder, gs4d, scene, words};
@@ -71,8 +72,11 @@ const REFUSED: &[(&str, &str)] = &[
     ("score a --out o --size 8x8", "the following required arguments were not provided"),
     ("score a --out o --static", "the following required arguments were not provided"),
     ("score a --out o --resolution 2", "the following required arguments were not provided"),
-    ("score a --data d --out o --variant energy --duration 3", "--duration has no effect on what is made here"),
-    ("score a --data d --out o --variant energy --up +y", "--up has no effect on views that are given"),
+    ("score a --data d --out o --variant energy --duration 3", "--duration has no effect on the result of this verb"),
+    (
+        "score a --data d --out o --variant energy --up +y",
+        "--up has no effect on the views of a dataset or a camera file",
+    ),
     ("score a --data d --out o --shard 0/2 --ratio 0.3", "--ratio has no effect with --shard: give it with --merge"),
     ("score --merge p --out o --variant all --data d", "--data has no effect on parts alone"),
     ("score --merge p --out o --variant all --views 3", "--views has no effect on parts alone"),
@@ -130,12 +134,12 @@ const REFUSED: &[(&str, &str)] = &[
     ("eval a --data d --engine cpu --adapter x", "--adapter has no effect with --engine cpu"),
     ("eval a --data d --engine cpu --checks", "--checks has no effect with --engine cpu"),
     ("eval a --data d --merge p --out o", "--out has no effect with --merge, which draws no pictures"),
-    ("eval a --data d --duration 3", "--duration has no effect on what is made here, which is not played"),
-    ("eval a --data d --up +y", "--up has no effect on views that are given"),
+    ("eval a --data d --duration 3", "--duration has no effect on the result of this verb, which is not played"),
+    ("eval a --data d --up +y", "--up has no effect on the views of a dataset or a camera file"),
     // ablate
     ("ablate a --data d --split test --validation times", "--validation has no effect with a --split of the dataset"),
-    ("ablate a --data d --duration 3", "--duration has no effect on what is made here, which is not played"),
-    ("ablate a --data d --up +y", "--up has no effect on views that are given"),
+    ("ablate a --data d --duration 3", "--duration has no effect on the result of this verb, which is not played"),
+    ("ablate a --data d --up +y", "--up has no effect on the views of a dataset or a camera file"),
     ("ablate a --data d --engine cpu --adapter x", "--adapter has no effect with --engine cpu"),
     ("ablate a --data d --variants energy --volume-rank 1", "--volume-rank has no effect on scores that do not use"),
     (
@@ -199,15 +203,24 @@ const REFUSED: &[(&str, &str)] = &[
     // the others
     ("info a --cameras c.png", "--cameras has no effect on a capture: it is for the folder of a dataset"),
     ("info a --static", "--static has no effect on a capture: it is for the folder of a dataset"),
-    ("export a o.ply --background 1,1,1", "--background has no effect on what is made here, which has no background"),
-    ("export a o.ply --time 0 --duration 3", "--duration has no effect on what is made here, which is not played"),
+    (
+        "export a o.ply --background 1,1,1",
+        "--background has no effect on the result of this verb, which has no background",
+    ),
+    (
+        "export a o.ply --time 0 --duration 3",
+        "--duration has no effect on the result of this verb, which is not played",
+    ),
     ("export a o.ftgs.ply --time 0", "--time has no effect on a format with motion"),
     ("export a o --sequence --format free-time", "--sequence has no effect on a format with motion"),
-    ("bench a --background 1,1,1", "--background has no effect on what is made here, which has no background"),
-    ("bench a --duration 3", "--duration has no effect on what is made here, which is not played"),
-    ("bench a --cameras c.json --up +y", "--up has no effect on views that are given"),
-    ("render a --out o --orbit 3 --duration 3", "--duration has no effect on what is made here, which is not played"),
-    ("render a --out o --cameras c.json --up +y", "--up has no effect on views that are given"),
+    ("bench a --background 1,1,1", "--background has no effect on the result of this verb, which has no background"),
+    ("bench a --duration 3", "--duration has no effect on the result of this verb, which is not played"),
+    ("bench a --cameras c.json --up +y", "--up has no effect on the views of a dataset or a camera file"),
+    (
+        "render a --out o --orbit 3 --duration 3",
+        "--duration has no effect on the result of this verb, which is not played",
+    ),
+    ("render a --out o --cameras c.json --up +y", "--up has no effect on the views of a dataset or a camera file"),
     ("render a --out o --orbit 3 --level 1 --antialias", "--antialias has no effect with --level"),
     ("bench a --orbit 3 --views 3", "the argument '--orbit <N>' cannot be used with '--views <N>'"),
     ("bench a --resolution 2", "the following required arguments were not provided"),
@@ -278,7 +291,8 @@ const READERS: &[(&str, &str)] = &[
     ("bake", "--data DATA -o OUT.gs4d --engine cpu"),
 ];
 
-/// Options of reading that some captures do not take, in every verb: a capture, the option, and the beginning of the sentence.
+/// Options of reading that some captures do not take, in every verb: a capture, the option, and the beginning of the
+/// sentence.
 const OF_FORMATS: &[(&str, &str, &str)] = &[
     ("SCENE.gs4d", "--fps 5", "--fps has no effect on this capture"),
     ("SCENE.gs4d", "--tolerance 0.5", "--tolerance has no effect on this capture"),
@@ -370,7 +384,8 @@ const REFUSED_ON_FILES: &[(&str, &str)] = &[
 const ACCEPTED: &[&str] = &[
     "convert FRAMES -o OUT.gs4d --fps 4",
     "convert MOVING.ftgs.ply -o OUT.gs4d --fps 5",
-    "convert SCENE.gs4d -o OUT.gs4d --rotation-convention flipped --prefilter-var -1 --up -y --duration 3 --background 1,1,1",
+    "convert SCENE.gs4d -o OUT.gs4d --rotation-convention flipped --prefilter-var -1 --up -y --duration 3 \
+     --background 1,1,1",
     "export SCENE.gs4d OUT --sequence --fps 2 --duration 1",
     "export SCENE.gs4d OUT.ftgs.ply --fps 2",
     "info STILL.ply --up -y --duration 2 --cutoff 0.1",
@@ -710,7 +725,7 @@ fn files() -> TempDir {
     }
     trained.environment = Some(Environment { width: 4, height: 2, texels: vec![0.5; 24] });
     let settings = WriteSettings::default();
-    offline::save(&path("surrounded.gs4d"), &trained, &settings).expect("the folder can be written to");
+    offline::work::save(&path("surrounded.gs4d"), &trained, &settings).expect("the folder can be written to");
     for picture in ["a.png", "b.png"] {
         image::RgbImage::new(8, 8).save(path(picture)).expect("the folder can be written to");
     }
@@ -774,7 +789,8 @@ fn verbs() -> BTreeSet<String> {
     list.lines().filter_map(first).filter(|word| !word.is_empty() && word != "help").collect()
 }
 
-/// Returns the verb and the option that a refused command line is about: that of the sentence, or else the last one of the command.
+/// Returns the verb and the option that a refused command line is about: that of the sentence, or else the last one of
+/// the command.
 fn about(command: &str, sentence: &str) -> (String, String) {
     let mut words = command.split(' ');
     let verb = words.next().unwrap_or_default();

@@ -1,17 +1,15 @@
 //! `gs4d bake --plan` and `--only`: a bake as jobs.
 //!
-//! In: a small synthetic scene, its own pictures as a dataset, plans. Out: proof that a plan has every stage with what it needs, that its jobs,
-//! in any order that it allows, twice at once and killed at random, give the bytes of a bake, and that a job too early, a bad plan and a full
-//! disk are named and lose nothing. Stages of training are skipped where there is no GPU.
+//! In: a small synthetic scene, its own pictures as a dataset, plans. Out: proof that a plan has every stage with what
+//! it needs, that its jobs, in any order that it allows, twice at once and killed at random, give the bytes of a bake,
+//! and that a job too early, a bad plan and a full disk are named and lose nothing. Stages of training are skipped
+//! where there is no GPU.
 
 use crate::support::capture::Capture;
-use crate::support::command::{GS4D, Run, arguments, gs4d};
+use crate::support::command::{GS4D, Run, arguments, gs4d, has_gpu};
 use crate::support::folders::names;
-use crate::support::no_gpu::no_gpu;
 use crate::support::random::Random;
-use bevy_gs4d::renderer::GpuContext;
-use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
-use glam::{UVec2, Vec3};
+use crate::support::small_capture::small_capture;
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::ffi::OsString;
@@ -22,8 +20,7 @@ use std::thread;
 use std::time::Duration;
 
 fn capture() -> Capture {
-    let scene = synthesize(&SynthSettings { count: 600, degree: 1, ..SynthSettings::default() });
-    Capture::new(scene, Vec3::ZERO, 4, 4, UVec2::splat(32), true)
+    small_capture(600, 4)
 }
 
 /// Goals, scores and filters, for which the stages differ.
@@ -187,8 +184,8 @@ fn jobs_killed_at_random_give_the_bytes_of_a_bake() {
 
 #[test]
 fn jobs_that_train_give_the_bytes_of_a_bake() {
-    if GpuContext::headless(None).is_err() {
-        return no_gpu();
+    if !has_gpu() {
+        return;
     }
     let capture = capture();
     let options = ["--engine", "gpu", "--ratio", "0.5", "--steps", "6", "--rounds", "2"];

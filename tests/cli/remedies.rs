@@ -1,17 +1,21 @@
 //! The remedies in errors of the command.
 //!
-//! In: command lines that fail, on captures and datasets made here. Out: proof that the error names a remedy, and that the command line that follows
-//! it succeeds. `src/cli/remedies.rs` checks that every verb and option in a message exists.
+//! In: command lines that fail, on captures and datasets made here. Out: proof that the error names a remedy, and that
+//! the command line that follows it succeeds, also for packages that were made with other options.
+//! `src/cli/remedies.rs` checks that every verb and option in a message exists.
 
 use crate::support::command::{arguments, folder, gs4d, scene, words};
 use crate::support::dataset;
+use crate::support::pth::Pth;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use glam::{UVec2, Vec3};
 use serde_json::Value;
+use std::ffi::OsString;
 use std::fs;
 use tempfile::TempDir;
 
-/// A command line that fails, the remedy in its error, and the command line that follows it. Words in capitals are files: see [`words`].
+/// A command line that fails, the remedy in its error, and the command line that follows it. Words in capitals are
+/// files: see [`words`].
 const REMEDIES: &[(&str, &str, &str)] = &[
     (
         "prune SCENE.gs4d --ratio 0.5 -o OUT.gs4d",
@@ -51,7 +55,8 @@ const REMEDIES: &[(&str, &str, &str)] = &[
     (
         "ablate SCENE.gs4d --data FEW --engine cpu",
         "or measure on the views of another --split",
-        "ablate SCENE.gs4d --data FEW --engine cpu --split test --trust-images --variants energy --ratios 0.5 --filters support",
+        "ablate SCENE.gs4d --data FEW --engine cpu --split test --trust-images --variants energy \
+         --ratios 0.5 --filters support",
     ),
     (
         "score SCENE.gs4d --data SIZELESS --out OUT.f32 --variant energy --engine cpu",
@@ -117,7 +122,7 @@ fn files() -> TempDir {
 }
 
 #[test]
-fn what_an_error_says_to_do_can_be_done() {
+fn the_remedy_of_an_error_succeeds() {
     let folder = files();
     for (number, (failing, remedy, working)) in REMEDIES.iter().enumerate() {
         let run = gs4d(&words(failing, folder.path(), number));
@@ -143,5 +148,26 @@ fn options_are_called_by_their_names_on_the_command_line() {
         ),
     ] {
         gs4d(&words(&format!("info SCENE.gs4d {option}"), folder.path(), 0)).must_fail(sentence);
+    }
+}
+
+#[test]
+fn a_package_made_with_another_value_is_made_again_by_the_command_of_the_error() {
+    let folder = folder();
+    let [checkpoint, package, again] = ["chkpnt.pth", "a.gs4d", "again.gs4d"].map(|name| folder.path().join(name));
+    fs::write(&checkpoint, Pth::rotating(20, 48).bytes()).expect("the folder can be written to");
+    gs4d(&arguments!["convert", &checkpoint, &package]).text();
+    for (option, value) in [
+        ("--time-interval", Some("0,2")),
+        ("--rotation-convention", Some("unflipped")),
+        ("--force-sh-3d", None),
+        ("--prefilter-var", Some("0.5")),
+    ] {
+        let given: Vec<OsString> = [Some(option), value].into_iter().flatten().map(OsString::from).collect();
+        let with = |words: &[OsString]| gs4d(&[words, &given].concat());
+        with(&arguments!["info", &package]).must_fail(&format!("gs4d convert {option}"));
+        with(&arguments!["convert", &checkpoint, &again]).text();
+        with(&arguments!["info", &again]).text();
+        fs::remove_file(&again).expect("it was made");
     }
 }

@@ -1,18 +1,18 @@
 //! `gs4d render` and `bench`, run as a user runs them.
 //!
-//! In: a synthetic scene; with `GS4D_DATA` set, the trained captures. Out: proof that pictures are written and frames timed, and that
-//! renders match the original. Skipped where there is no GPU.
+//! In: a synthetic scene; with `GS4D_DATA` set, the trained captures. Out: proof that pictures are written and frames
+//! timed, and that renders match the original. Skipped where there is no GPU.
 
 use crate::support::capture::Capture;
-use crate::support::command::{arguments, folder, gs4d, scene};
+use crate::support::command::{arguments, folder, gs4d, has_gpu, scene};
 use crate::support::data::data;
 use crate::support::folders::contents;
 use crate::support::no_gpu::no_gpu;
 use crate::support::npz;
 use crate::support::skip::skip;
 use bevy_gs4d::codec::package::WriteSettings;
-use bevy_gs4d::offline::metrics::SquaredError;
-use bevy_gs4d::offline::save;
+use bevy_gs4d::offline::measure::SquaredError;
+use bevy_gs4d::offline::work::save;
 use bevy_gs4d::renderer::GpuContext;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{SceneForm, Trained};
@@ -21,15 +21,6 @@ use glam::{UVec2, Vec3};
 use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
-
-/// Returns whether there is a GPU; reports if there is none.
-fn has_gpu() -> bool {
-    let some = !GpuContext::adapters().is_empty();
-    if !some {
-        no_gpu();
-    }
-    some
-}
 
 #[test]
 fn pictures_are_drawn_and_written() {
@@ -86,7 +77,7 @@ fn images_of_a_camera_file_are_written_only_if_none_of_them_exists() {
 }
 
 #[test]
-fn pictures_of_what_is_nearer_than_the_near_limit_are_pointed_out() {
+fn empty_pictures_of_gaussians_nearer_than_the_near_limit_are_noted() {
     if !has_gpu() {
         return;
     }

@@ -1,15 +1,14 @@
 //! `gs4d score`, `mask` and `eval` with `--shard` and `--merge`.
 //!
-//! In: a small synthetic scene, its own pictures as a dataset. Out: proof that the parts of all shards give the results of one computation, that
-//! a part that is there is not made again, that parts that do not belong together are refused by name, and that a part is whole or absent if
-//! its run is killed or the disk is full.
+//! In: a small synthetic scene, its own pictures as a dataset. Out: proof that the parts of all shards give the results
+//! of one computation, that a part that is there is not made again, that parts that do not belong together are refused
+//! by name, and that a part is whole or absent if its run is killed or the disk is full.
 
 use crate::support::capture::Capture;
 use crate::support::command::{GS4D, Run, arguments, gs4d};
 use crate::support::folders::names;
 use crate::support::random::Random;
-use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
-use glam::{UVec2, Vec3};
+use crate::support::small_capture::small_capture;
 use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -19,8 +18,7 @@ use std::time::Instant;
 
 /// Returns a scene and its dataset: four cameras at five times.
 fn capture() -> Capture {
-    let scene = synthesize(&SynthSettings { count: 400, degree: 1, ..SynthSettings::default() });
-    Capture::new(scene, Vec3::ZERO, 4, 5, UVec2::splat(32), true)
+    small_capture(400, 5)
 }
 
 impl Capture {
@@ -181,7 +179,7 @@ fn parts_that_do_not_belong_together_are_refused_by_name() {
     };
     refused(&[&parts[0], &parts[2]], &["1/3 is missing"]);
     refused(&[&parts[0], &parts[1], &parts[2], &parts[1]], &[&name(&parts[1]), "shard 1/3 once more"]);
-    refused(&[&parts[0], &other[1], &parts[2]], &[&name(&other[1]), "another --volume-power: 0.3, not 0.1"]);
+    refused(&[&parts[0], &other[1], &parts[2]], &[&name(&other[1]), "another power of the volume: 0.3, not 0.1"]);
     refused(&[&parts[0], &fewer[1]], &[&name(&fewer[1]), "is one of 2 shards, not of 3"]);
     refused(&[&parts[0], &masks[0]], &[&name(&masks[0]), "is a part of gs4d mask, not of gs4d score"]);
     refused(&[&parts[0], &capture.scene], &["scene.gs4d: is no part of gs4d"]);

@@ -1,21 +1,19 @@
-//! How signals end the command: at random moments of work on the GPU, while a pipe without a reader is written, while a bake writes its outputs.
+//! How signals end the command: at random moments of work on the GPU, while a pipe without a reader is written, while a
+//! bake writes its outputs.
 //!
-//! In: a small synthetic scene, its own pictures as a dataset, verbs that get INT or TERM. Out: proof that a run ends with 130, 143 or its own
-//! code, without a crash, that no temporary or half-written file is left, and that `--json` says what exists. Work on the GPU is skipped where
-//! there is none.
+//! In: a small synthetic scene, its own pictures as a dataset, verbs that get INT or TERM. Out: proof that a run ends
+//! with 130, 143 or its own code, without a crash, that no temporary or half-written file is left, and that `--json`
+//! says what exists. Work on the GPU is skipped where there is none.
 //!
-//! `GS4D_SIGNALS` is the number of runs at random moments, over all verbs: 10 unless `.ci/full` sets more. `GS4D_SEED` is the seed of the
-//! moments: several processes can share the runs.
+//! `GS4D_SIGNALS` is the number of runs at random moments, over all verbs: 10 unless `.ci/full` sets more. `GS4D_SEED`
+//! is the seed of the moments: several processes can share the runs.
 
 use crate::support::capture::Capture;
-use crate::support::command::{GS4D, Run, arguments, folder, gs4d, scene};
+use crate::support::command::{GS4D, Run, arguments, folder, gs4d, has_gpu, scene};
 use crate::support::folders::{contents, names};
-use crate::support::no_gpu::no_gpu;
 use crate::support::random::Random;
+use crate::support::small_capture::small_capture;
 use bevy_gs4d::codec::package;
-use bevy_gs4d::renderer::GpuContext;
-use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
-use glam::{UVec2, Vec3};
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsString;
@@ -78,17 +76,8 @@ fn started(command: &[OsString]) -> Child {
     child.spawn().expect("the command starts")
 }
 
-fn on_gpu() -> bool {
-    let found = GpuContext::headless(None).is_ok();
-    if !found {
-        no_gpu();
-    }
-    found
-}
-
 fn capture() -> Capture {
-    let trained = synthesize(&SynthSettings { count: 300, degree: 1, ..SynthSettings::default() });
-    Capture::new(trained, Vec3::ZERO, 4, 3, UVec2::splat(32), true)
+    small_capture(300, 3)
 }
 
 /// Makes a pipe that has a name.
@@ -176,7 +165,7 @@ fn check(out: &Path, document: Option<&Value>, context: &str) {
 
 #[test]
 fn random_signals_end_work_on_the_gpu_without_a_crash() {
-    if !on_gpu() {
+    if !has_gpu() {
         return;
     }
     let wanted = std::env::var("GS4D_SIGNALS").ok();
@@ -283,7 +272,7 @@ fn a_full_standard_output_does_not_delay_the_end() {
 
 #[test]
 fn pictures_into_a_pipe_without_a_reader_do_not_delay_the_end() {
-    if !on_gpu() {
+    if !has_gpu() {
         return;
     }
     let (inputs, out) = (folder(), folder());
@@ -315,7 +304,7 @@ fn pictures_into_a_pipe_without_a_reader_do_not_delay_the_end() {
 
 #[test]
 fn fine_tuning_ends_with_a_result_and_a_second_signal_ends_it_at_once() {
-    if !on_gpu() {
+    if !has_gpu() {
         return;
     }
     let capture = capture();

@@ -1,15 +1,15 @@
 //! Pictures that do not fit the memory or the GPU, in every verb that draws or loads pictures.
 //!
-//! In: a small scene, a dataset of it, sizes of 16384x16384 pixels, a limit on the address space that a shell sets. Out: proof that each verb
-//! refuses them at once, with the need, the limit and the option that makes pictures smaller, and writes no file.
+//! In: a small scene, a dataset of it, sizes of 16384x16384 pixels, a limit on the address space that a shell sets.
+//! Out: proof that each verb refuses them at once, with the need, the limit and the option that makes pictures smaller,
+//! and writes no file.
 
 use crate::support::capture::Capture;
-use crate::support::command::{GS4D, Run, arguments, gs4d};
+use crate::support::command::{GS4D, Run, arguments, gs4d, has_gpu};
 use crate::support::no_gpu::no_gpu;
 use crate::support::skip::skip;
+use crate::support::small_capture::small_capture;
 use bevy_gs4d::renderer::GpuContext;
-use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
-use glam::{UVec2, Vec3};
 use std::ffi::OsString;
 use std::process::Command;
 use std::time::{Duration, Instant};
@@ -20,8 +20,7 @@ const LIMIT: &str = "3000000";
 const AT_ONCE: Duration = Duration::from_secs(20);
 
 fn capture() -> Capture {
-    let trained = synthesize(&SynthSettings { count: 100, degree: 1, ..SynthSettings::default() });
-    Capture::new(trained, Vec3::ZERO, 4, 2, UVec2::splat(32), true)
+    small_capture(100, 2)
 }
 
 /// Runs the command within the limit.
@@ -96,8 +95,8 @@ fn pictures_that_do_not_fit_the_gpu_are_refused_before_training() {
 
 #[test]
 fn levels_of_detail_from_too_many_directions_are_refused_before_they_are_made() {
-    if GpuContext::headless(None).is_err() {
-        return no_gpu();
+    if !has_gpu() {
+        return;
     }
     let (capture, start) = (capture(), Instant::now());
     let out = capture.path("out.gs4d");

@@ -1,13 +1,12 @@
 //! `gs4d train`, run as a user runs it, on pictures of a synthetic scene.
 //!
-//! In: a dataset drawn here. Out: proof that a capture is trained from the pictures alone, that the package is written while training goes on
-//! and after an interruption, and that data that no capture can be trained on is refused and leaves no files. Skipped where there is no GPU.
+//! In: a dataset drawn here. Out: proof that a capture is trained from the pictures alone, that the package is written
+//! while training goes on and after an interruption, and that data that no capture can be trained on is refused and
+//! leaves no files. Skipped where there is no GPU.
 
 use crate::support::capture::Capture;
-use crate::support::command::{GS4D, Run, arguments, gs4d};
+use crate::support::command::{GS4D, Run, arguments, gs4d, has_gpu};
 use crate::support::folders;
-use crate::support::no_gpu::no_gpu;
-use bevy_gs4d::renderer::GpuContext;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use glam::{UVec2, Vec3};
 use image::{RgbImage, Rgba, RgbaImage};
@@ -16,8 +15,7 @@ use std::fs;
 
 /// Returns a dataset of 4 cameras and 4 times; `None` if there is no GPU.
 fn dataset() -> Option<Capture> {
-    if GpuContext::headless(None).is_err() {
-        no_gpu();
+    if !has_gpu() {
         return None;
     }
     let scene = synthesize(&SynthSettings { count: 400, ..SynthSettings::default() });
@@ -51,7 +49,7 @@ fn a_capture_is_trained_from_the_pictures_of_a_dataset() {
 }
 
 #[test]
-fn points_of_the_dataset_or_of_a_file_are_what_training_begins_with() {
+fn training_begins_with_points_of_the_dataset_or_of_a_file() {
     let Some(capture) = dataset() else { return };
     let out = capture.path("out.gs4d");
     let run = |more: &[&str]| {

@@ -1,12 +1,12 @@
 //! Anti-aliasing: views with larger pixels than training had.
 //!
-//! In: a disk of many small Gaussians, drawn by the CPU reference in a small picture, and in a large picture that is averaged down. Out:
-//! proof that small pictures are much closer to the averages with anti-aliasing, that views with pixels of training size do not change, and that
-//! the filter of Mip-Splatting is that of its paper.
+//! In: a disk of many small Gaussians, drawn by the CPU reference in a small picture, and in a large picture that is
+//! averaged down. Out: proof that small pictures are much closer to the averages with anti-aliasing, that views with
+//! pixels of training size do not change, and that the filter of Mip-Splatting is that of its paper.
 
 use crate::support::blob::blob;
 use bevy_gs4d::gaussian::Harmonics;
-use bevy_gs4d::internal::gaussian::projection::project;
+use bevy_gs4d::internal::gaussian::project;
 use bevy_gs4d::reference::render;
 use bevy_gs4d::scene::{RuntimeScene, TrainedWith};
 use bevy_gs4d::view::{Background, Camera, Frame, RasterFov, View};
@@ -20,7 +20,8 @@ const DISTANCE: f32 = 40.0;
 /// Size of a pixel of the near picture, units.
 const PIXEL: f32 = 0.1 * DISTANCE / 256.0;
 
-/// Returns a disk of a radius of one unit, in rings, with gaps between its Gaussians; each is about a pixel of the near picture.
+/// Returns a disk of a radius of one unit, in rings, with gaps between its Gaussians; each is about a pixel of the near
+/// picture.
 fn disk() -> RuntimeScene {
     let mut gaussians = Vec::new();
     for ring in 0..16 {
@@ -83,7 +84,11 @@ fn the_filter_of_mip_splatting_is_the_ratio_of_the_areas_without_and_with_the_lo
             let expected = 0.8 * areas.sqrt();
             let opacity = found.opacity;
             assert!((opacity - expected).abs() < 1e-3, "{x} by {y} in {side} pixels: {opacity}, expected {expected}");
-            assert_eq!((plain.opacity, plain.conic), (0.8, found.conic), "without the filter the same shape is opaque");
+            assert_eq!(
+                (plain.opacity, plain.conic),
+                (0.8, found.conic),
+                "without the filter the conic is the same and the opacity is not reduced"
+            );
         }
         for size in [None, Some(PIXEL), Some(100.0 * PIXEL)] {
             assert_eq!(filtered.antialiased(size), filtered, "anti-aliasing does not undo the filter");

@@ -1,16 +1,17 @@
 //! Reading checkpoints of the original trainer.
 //!
-//! In: the checkpoints in `tests/golden/`, crafted checkpoints and, with `GS4D_DATA` set, checkpoints of trained captures. Out:
-//! proof that each is read as the scene that was written.
+//! In: the checkpoints in `tests/golden/`, crafted checkpoints and, with `GS4D_DATA` set, checkpoints of trained
+//! captures. Out: proof that each is read as the scene that was written.
 
 use crate::support::data;
 use crate::support::golden;
 use crate::support::pth::{self, Pth};
+use crate::support::trained::trained;
 use bevy_gs4d::codec::checkpoint::{self, CheckpointError};
 use bevy_gs4d::codec::{self, ReadOptions};
 use bevy_gs4d::gaussian::{Harmonics, Model, Parameters};
-use bevy_gs4d::internal::codec::checkpoint::describe;
-use bevy_gs4d::scene::{GaussianScene, RotationConvention, SceneForm, Trained, TrainedCameras, UpAxis};
+use bevy_gs4d::internal::codec::describe;
+use bevy_gs4d::scene::{GaussianScene, RotationConvention, TrainedCameras, UpAxis};
 use serde_json::Value;
 use std::io::Cursor;
 
@@ -20,13 +21,6 @@ fn read_with(pth: &Pth, options: &ReadOptions) -> Result<GaussianScene, Checkpoi
 
 fn read(pth: &Pth) -> GaussianScene {
     read_with(pth, &ReadOptions::default()).expect("a valid checkpoint")
-}
-
-fn trained(scene: &GaussianScene) -> &Trained {
-    match &scene.form {
-        SceneForm::Trained(trained) => trained,
-        SceneForm::Ready(_) => panic!("a checkpoint holds the trained form"),
-    }
 }
 
 fn parameters(scene: &GaussianScene) -> &Parameters {

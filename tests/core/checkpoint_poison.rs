@@ -12,7 +12,8 @@ use proptest::prelude::*;
 use proptest::sample::{Index, select};
 use std::io::Cursor;
 
-fn read(bytes: &[u8]) -> Result<GaussianScene, CheckpointError> {
+/// Reads a checkpoint with default options.
+pub fn read(bytes: &[u8]) -> Result<GaussianScene, CheckpointError> {
     checkpoint::read(Cursor::new(bytes), &ReadOptions::default(), None)
 }
 

@@ -1,14 +1,16 @@
 //! Exports.
 //!
-//! In: synthetic scenes. Out: proof that the files show the scene at their time, or with its motion, when they are read again.
+//! In: synthetic scenes. Out: proof that the files show the scene at their time, or with its motion, when they are read
+//! again.
 
+use crate::support::trained::trained_mut;
 use bevy_gs4d::codec::{ReadOptions, load};
 use bevy_gs4d::gaussian::{Gaussian, Harmonics};
-use bevy_gs4d::internal::codec::export::{EXPORTS, Export, Exporter};
+use bevy_gs4d::internal::codec::{EXPORTS, Export, Exporter};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{
-    ActiveSets, FilterKind, Form, GaussianScene, Origin, RuntimeScene, SceneForm, Sliced, TemporalFilter, Trained,
-    TrainedWith, UpAxis,
+    ActiveSets, FilterKind, Form, GaussianScene, Origin, RuntimeScene, SceneForm, Sliced, TemporalFilter, TrainedWith,
+    UpAxis,
 };
 use bevy_gs4d::view::RasterFov;
 use glam::Vec3;
@@ -26,7 +28,7 @@ fn bytes(exporter: &Exporter, time: f32) -> Vec<u8> {
     bytes
 }
 
-/// Returns a scene after an export and a second import.
+/// Exports a scene and returns the imported file.
 fn again(scene: &GaussianScene, id: &str, time: f32) -> GaussianScene {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let export = Export::of_id(id).expect("a format");
@@ -46,7 +48,7 @@ fn moving() -> GaussianScene {
 fn resting(degree: u32) -> GaussianScene {
     let mut scene = moving();
     scene.form.truncate_colors(degree, 0);
-    let SceneForm::Trained(Trained { parameters, .. }) = &mut scene.form else { panic!("the trained form") };
+    let parameters = &mut trained_mut(&mut scene).parameters;
     (parameters.mean_t, parameters.log_scale_t, parameters.rotation_r) = Default::default();
     scene
 }
@@ -77,20 +79,20 @@ fn parameters_at_rest_come_back_bit_for_bit() {
 }
 
 #[test]
-fn a_file_of_one_time_shows_what_is_drawn_then() {
+fn a_file_of_one_time_has_the_gaussians_drawn_at_that_time() {
     let scene = moving();
     let (all, colors) = sliced(&scene);
     let span = scene.trained_with.time_span();
     for time in [0.0, 0.37, 0.9] {
         let (found, found_colors) = sliced(&again(&scene, "ply", time));
         let drawn: Vec<usize> = (0..all.len()).filter(|&i| all[i].marginal(time) > 0.05).collect();
-        assert!(drawn.len() < all.len() && !drawn.is_empty(), "some are drawn at {time}");
+        assert!(drawn.len() < all.len() && !drawn.is_empty(), "some Gaussians, but not all, are drawn at {time}");
         assert_eq!(found.len(), drawn.len(), "at {time}, the Gaussians that are drawn");
         assert_eq!((found_colors.degree, found_colors.degree_t), (3, 0), "color without time");
         for (at, &index) in drawn.iter().enumerate() {
             let (found, expected) = (&found[at], &all[index]);
             let what = format!("Gaussian {index} at {time}");
-            assert_eq!(Vec3::from(found.mean), expected.mean_at(time), "{what}: where it is");
+            assert_eq!(Vec3::from(found.mean), expected.mean_at(time), "{what}: the position");
             assert_same_shape(found, expected, &what);
             let opacity = expected.opacity * expected.marginal(time);
             assert!((found.opacity - opacity).abs() < 1e-6, "{what}: {} is {opacity}", found.opacity);
@@ -115,7 +117,7 @@ fn a_filter_and_packed_gaussians_are_exported_as_they_are_drawn() {
 }
 
 #[test]
-fn lines_and_lifespans_come_back_from_free_time() {
+fn linear_motion_and_lifespans_come_back_from_free_time() {
     let mut scene = moving();
     scene.form.truncate_colors(3, 0);
     scene.trained_with.time_interval = [-0.5, 1.5];
@@ -141,7 +143,7 @@ fn lines_and_lifespans_come_back_from_free_time() {
 }
 
 #[test]
-fn color_in_time_is_exported_as_its_mean_over_the_life() {
+fn color_in_time_is_exported_as_its_mean_over_the_lifespan() {
     let scene = moving();
     let exporter = exporter(&scene, "free-time");
     assert!(exporter.lost().iter().any(|sentence| sentence.contains("mean")), "it is stated: {:?}", exporter.lost());
@@ -194,7 +196,7 @@ fn a_sequence_comes_back_frame_by_frame() {
 }
 
 #[test]
-fn folders_without_a_sequence_are_refused_with_the_rule() {
+fn folders_without_a_sequence_are_refused_with_the_rule_for_names() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let message = |path: &Path| load(path, &ReadOptions::default()).expect_err("no capture").to_string();
     assert!(message(folder.path()).contains("frame_0001.ply"), "an empty folder: the names are described");
@@ -205,7 +207,7 @@ fn folders_without_a_sequence_are_refused_with_the_rule() {
 }
 
 #[test]
-fn splat_files_come_back_within_their_steps() {
+fn splat_files_come_back_within_their_quantization_steps() {
     let scene = resting(0);
     let (found, expected) = (again(&scene, "splat", 0.0), scene);
     let (SceneForm::Trained(found), SceneForm::Trained(expected)) = (&found.form, &expected.form) else {
@@ -242,13 +244,13 @@ fn imports_of_every_format_have_the_true_field_of_view() {
     for format in EXPORTS {
         let path = folder.path().join(format!("it.{}", format.extension));
         let mut bytes = Vec::new();
-        // The feature of a format may be off.
+        // The feature of a format may be disabled.
         if exporter(&scene, format.id).write(0.4, &mut bytes).is_err() {
             continue;
         }
         fs::write(&path, bytes).expect("the folder can be written to");
         let Ok(found) = load(&path, &ReadOptions::default()) else { continue };
-        assert_eq!(found.trained_with.raster_fov, RasterFov::Corrected, "{}: the true one", format.name);
+        assert_eq!(found.trained_with.raster_fov, RasterFov::Corrected, "{}: the true field of view", format.name);
         let options = ReadOptions { raster_fov: Some(RasterFov::Reference), ..ReadOptions::default() };
         let found = load(&path, &options).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(found.trained_with.raster_fov, RasterFov::Reference, "{}: the option", format.name);
@@ -258,15 +260,15 @@ fn imports_of_every_format_have_the_true_field_of_view() {
 }
 
 #[test]
-fn the_axis_that_points_up_comes_back() {
+fn the_up_axis_comes_back() {
     let mut scene = resting(1);
     for up in [UpAxis::PosZ, UpAxis::NegX, UpAxis::NegY] {
         scene.playback.up = up;
         for id in ["ply", "free-time"] {
             let found = again(&scene, id, 0.0);
-            assert_eq!(found.playback.up, up, "{id}: the comment says it");
+            assert_eq!(found.playback.up, up, "{id}: the up axis is in a comment");
             let means = |scene: &GaussianScene| sliced(scene).0.iter().map(|one| one.mean).collect::<Vec<_>>();
-            assert_eq!(means(&found), means(&scene), "{id}: the coordinates stay");
+            assert_eq!(means(&found), means(&scene), "{id}: the coordinates are unchanged");
             let said = exporter(&scene, id).lost().iter().any(|sentence| sentence.contains("points up"));
             assert_eq!(said, up != UpAxis::NegY, "{id}: an axis that other programs do not expect is stated");
         }
@@ -275,12 +277,12 @@ fn the_axis_that_points_up_comes_back() {
         assert_eq!(found.playback.up, UpAxis::NegY, "the axis of the format");
         let heights = sliced(&found).0.iter().map(|one| -one.mean[1]).collect::<Vec<_>>();
         let expected: Vec<f32> = expected.iter().map(|one| up.vector().dot(Vec3::from(one.mean))).collect();
-        assert_eq!(heights, expected, "{up:?}: the height of each Gaussian stays");
+        assert_eq!(heights, expected, "{up:?}: the height of each Gaussian is unchanged");
     }
 }
 
 #[test]
-fn places_of_the_files_come_back_with_their_digits() {
+fn positions_far_from_0_come_back_with_their_digits() {
     let mut scene = moving();
     scene.form.truncate_colors(3, 0);
     scene.trained_with.origin = Origin { place: [500_000.0, 5_400_001.0, -310.5], time: 1.7e9 };
@@ -311,7 +313,7 @@ fn places_of_the_files_come_back_with_their_digits() {
 fn gaussians_too_far_for_spz_are_left_out_and_counted() {
     let mut scene = resting(0);
     (scene.playback.up, scene.playback.duration_seconds) = (UpAxis::PosY, 0.0);
-    let SceneForm::Trained(Trained { parameters, .. }) = &mut scene.form else { panic!("the trained form") };
+    let parameters = &mut trained_mut(&mut scene).parameters;
     (parameters.mean[7], parameters.mean[8]) = ([0.0, 1e9, 0.0], [-1e6, 0.0, 0.0]);
     let exporter = exporter(&scene, "spz");
     let is_stated = exporter.lost().iter().any(|sentence| sentence.starts_with("2 of 400 Gaussians are left out"));

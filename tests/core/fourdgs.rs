@@ -1,15 +1,18 @@
 //! Files of the 4dgs format.
 //!
-//! In: the files of its conformance suite in the folder that `GS4D_DATA` names, with what a decoder must find in each; exports. Out: proof that it is
-//! found, that exports are drawn as their scenes, and that a small file of many Gaussians is refused.
+//! In: the files of its conformance suite in the folder that `GS4D_DATA` names, each with its expected values; exports.
+//! Out: proof that these values are read, that exports are drawn as their scenes, and that a small file of many
+//! Gaussians is refused.
 
 use crate::support::data::data;
+use crate::support::psnr::psnr;
 use crate::support::skip::skip;
+use crate::support::trained::trained_mut;
 use bevy_gs4d::codec::{ReadOptions, load};
-use bevy_gs4d::internal::codec::export::{Export, Exporter};
+use bevy_gs4d::internal::codec::{Export, Exporter};
 use bevy_gs4d::reference;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
-use bevy_gs4d::scene::{GaussianScene, RuntimeScene, SceneForm, Trained};
+use bevy_gs4d::scene::{GaussianScene, RuntimeScene};
 use bevy_gs4d::view::{Background, Camera, Frame, RasterFov};
 use glam::{UVec2, Vec3};
 use serde_json::Value;
@@ -68,7 +71,7 @@ fn files_of_the_conformance_suite_are_read_as_their_descriptions_say() {
 /// Size of the pictures that are compared.
 const SIZE: UVec2 = UVec2::new(80, 60);
 
-/// Returns a scene after an export and an import. The import plays in seconds.
+/// Exports a scene; returns the imported file, whose unit of time is the second, and the losses.
 fn again(scene: &GaussianScene, id: &str) -> (RuntimeScene, Vec<String>) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let format = Export::of_id(id).expect("a format");
@@ -83,7 +86,7 @@ fn again(scene: &GaussianScene, id: &str) -> (RuntimeScene, Vec<String>) {
     (found.into_runtime().expect("it can be drawn"), exporter.lost().to_vec())
 }
 
-/// Returns a picture at a part of the clip, seen from a place beside its middle.
+/// Draws a scene at a fraction of its clip, from the position `target + from` towards `target`.
 fn drawn(scene: &RuntimeScene, from: Vec3, target: Vec3, part: f32) -> Frame {
     let [first, last] = scene.trained_with.time_interval;
     let camera = Camera::look_at(target + from, target, Vec3::Y, 0.7, SIZE);
@@ -91,23 +94,11 @@ fn drawn(scene: &RuntimeScene, from: Vec3, target: Vec3, part: f32) -> Frame {
     reference::render(scene, &view, Background::Color([0.0; 3]))
 }
 
-/// Returns the peak signal-to-noise ratio of two pictures whose colors are clamped, decibels.
-fn psnr(a: &Frame, b: &Frame) -> f64 {
-    let pairs = a.picture.pixels.iter().zip(&b.picture.pixels);
-    let squares: f64 = pairs
-        .map(|(a, b)| {
-            let difference = a.clamp(Vec3::ZERO, Vec3::ONE) - b.clamp(Vec3::ZERO, Vec3::ONE);
-            f64::from(difference.length_squared())
-        })
-        .sum();
-    10.0 * (3.0 * a.picture.pixels.len() as f64 / squares.max(1e-30)).log10()
-}
-
 #[test]
 fn large_opaque_splats_are_drawn_as_their_scene() {
     let mut scene = synthesize(&SynthSettings { count: 500, ..SynthSettings::default() });
     scene.form.truncate_colors(0, 0);
-    let SceneForm::Trained(Trained { parameters, .. }) = &mut scene.form else { panic!("the trained form") };
+    let parameters = &mut trained_mut(&mut scene).parameters;
     for (index, scale) in parameters.log_scale.iter_mut().enumerate() {
         *scale = [1.5 + (index % 7) as f32 * 0.1, 1.0, 0.5 + (index % 5) as f32 * 0.1];
     }

@@ -3,12 +3,13 @@
 //! In: the scenes of `tests/golden/`. Out: proof that pictures, radii and tile rectangles match the original.
 
 use crate::support::golden::{self, GoldenView};
-use bevy_gs4d::internal::gaussian::projection;
+use bevy_gs4d::internal::gaussian;
 use bevy_gs4d::reference;
 use serde_json::Value;
 
-/// The CPU reference computes in f32 as the original does: sums differ by some units in the last place, and pixels where a decision is
-/// within rounding by 1/255. The largest differences are 9e-7 of color, 3e-6 of depth, 8e-7 of alpha.
+/// The CPU reference computes in f32 as the original does: sums differ by some units in the last place, and pixels
+/// where a decision is within rounding by 1/255. The largest differences are 9e-7 of color, 3e-6 of depth, 8e-7 of
+/// alpha.
 #[test]
 fn the_cpu_reference_matches_the_original() {
     for golden in golden::all_views() {
@@ -38,7 +39,7 @@ fn footprints_match_the_original() {
         let gaussians = gaussians(&golden);
         let visible = gaussians["visible"].as_array().expect("visible");
         for (i, gaussian) in golden.scene.iter().enumerate() {
-            let projected = projection::project(&gaussian, &golden.view);
+            let projected = gaussian::project(&gaussian, &golden.view);
             let expected = visible[i] == true || visible[i] == 1;
             assert_eq!(projected.is_some(), expected, "{}: Gaussian {i} is visible", golden.name);
             if let Some(projected) = projected {

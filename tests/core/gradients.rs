@@ -1,14 +1,12 @@
 //! Gradients: the CPU reference of the backward passes against golden gradients and against finite differences.
 //!
-//! In: the scenes of `tests/golden/`; four Gaussians made here, each so large that it is blended at every pixel.
-//! Out: proof that the gradient of every raw parameter is right, in every model.
+//! In: the scenes of `tests/golden/`; four Gaussians made here, each so large that it is blended at every pixel. Out:
+//! proof that the gradient of every raw parameter is right, in every model.
 
 use crate::support::golden_gradients::{GoldenGradient, all_gradients, tensor};
 use bevy_gs4d::gaussian::{GradientMode, Harmonics, Model, Parameters, ShDirection, SliceSettings};
-use bevy_gs4d::internal::gaussian::alpha::{ALPHA_MIN, alpha_at};
-use bevy_gs4d::internal::gaussian::{
-    GradientSettings, ParameterGradient, SplatGradient, parameter_gradient, projection,
-};
+use bevy_gs4d::internal::gaussian::{self, GradientSettings, ParameterGradient, SplatGradient, parameter_gradient};
+use bevy_gs4d::internal::gaussian::{ALPHA_MIN, alpha_at};
 use bevy_gs4d::internal::reference::{self, PixelGradients};
 use bevy_gs4d::reference::Layer;
 use bevy_gs4d::scene::{GaussianScene, PlaybackHints, RuntimeScene, SceneForm, Trained, TrainedWith};
@@ -25,7 +23,8 @@ fn of_golden(gradient: &GoldenGradient, mode: GradientMode) -> Vec<ParameterGrad
     reference::gradients(trained, slice, &golden.scene, &golden.view, golden.background, &pixels, mode)
 }
 
-/// A hundred-thousandth of the norm of each tensor: views are drawn in single precision, the golden gradients in double.
+/// A hundred-thousandth of the norm of each tensor: views are drawn in single precision, the golden gradients in
+/// double.
 #[test]
 fn gradients_match_the_golden_gradients() {
     for golden in all_gradients() {
@@ -57,7 +56,7 @@ fn gaussians_that_are_not_drawn_have_no_gradient() {
         let scene = &golden.golden.scene;
         assert_eq!(gradients.len(), scene.len(), "{}: one for each Gaussian", golden.golden.name);
         for (index, (gaussian, gradient)) in scene.iter().zip(&gradients).enumerate() {
-            if projection::project(&gaussian, &golden.golden.view).is_none() {
+            if gaussian::project(&gaussian, &golden.golden.view).is_none() {
                 let zero = vec![0.0; gradient.harmonics.len()];
                 let none = ParameterGradient { harmonics: zero, ..ParameterGradient::default() };
                 assert_eq!(*gradient, none, "{}: Gaussian {index}", golden.golden.name);
@@ -184,7 +183,8 @@ impl Case {
         Some((after - before) / (high - low))
     }
 
-    /// Asserts that no decision changes within a step: all Gaussians are blended at all pixels, with no clamp, and keep their order.
+    /// Asserts that no decision changes within a step: all Gaussians are blended at all pixels, with no clamp, and keep
+    /// their order.
     fn assert_smooth(&self) {
         let scene = self.scene(&self.trained);
         let layer = Layer { scene: &scene, view: self.view, appearance: Appearance::default() };
@@ -345,7 +345,8 @@ fn gradients_in_an_orthographic_view_are_difference_quotients() {
     assert_differences(&Case { view, ..case });
 }
 
-/// The filter of Mip-Splatting matters to splats of about a pixel, which no picture shows everywhere: the opacity of each splat is the loss.
+/// The filter of Mip-Splatting matters to splats of about a pixel, which no picture shows everywhere: the opacity of
+/// each splat is the loss.
 #[test]
 fn gradients_through_the_filter_of_mip_splatting_are_difference_quotients() {
     const STEP: f32 = 2e-3;
@@ -362,7 +363,7 @@ fn gradients_through_the_filter_of_mip_splatting_are_difference_quotients() {
     let splat = SplatGradient { opacity: 1.0, ..SplatGradient::default() };
     let opacity = |trained: &Trained, index: usize| {
         let gaussian = case.scene(trained).gaussian(index);
-        f64::from(projection::project(&gaussian, &case.view).expect("it is in the picture").opacity)
+        f64::from(gaussian::project(&gaussian, &case.view).expect("it is in the picture").opacity)
     };
     let Trained { parameters, harmonics } = &case.trained;
     for kind in &KINDS[..7] {

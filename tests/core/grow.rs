@@ -1,22 +1,18 @@
 //! Growing a capture.
 //!
-//! In: a synthetic scene. Out: proof that the parts of a Gaussian together have its mean and covariance, and that each part has its color
-//! and opacity.
+//! In: a synthetic scene. Out: proof that the parts of a Gaussian together have its mean and covariance, and that each
+//! part has its color and opacity.
 
+use crate::support::trained::trained;
 use bevy_gs4d::scene::grow::grow;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
-use bevy_gs4d::scene::{GaussianScene, SceneForm, Trained};
+use bevy_gs4d::scene::{GaussianScene, Trained};
 use glam::{DMat4, DVec4};
 
 const TIMES: usize = 4000;
 
 fn scene() -> GaussianScene {
     synthesize(&SynthSettings { count: 5, ..SynthSettings::default() })
-}
-
-fn trained(scene: &GaussianScene) -> &Trained {
-    let SceneForm::Trained(trained) = &scene.form else { panic!("a synthetic scene is in the trained form") };
-    trained
 }
 
 fn mean_of(trained: &Trained, index: usize) -> DVec4 {

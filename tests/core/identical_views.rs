@@ -1,12 +1,16 @@
 //! Choosing a number of Gaussians if some views are reproduced exactly.
 //!
-//! In: a synthetic scene, twenty noisy images of it, and four views of the background alone, whose images the scene reproduces exactly.
-//! Out: proof that the PSNR of the comparison is finite and that the four views do not change the chosen number.
+//! In: a synthetic scene, twenty noisy images of it, and four views of the background alone, whose images the scene
+//! reproduces exactly. Out: proof that the PSNR of the comparison is finite and that the four views do not change the
+//! chosen number.
 
-use bevy_gs4d::internal::offline::quality::{Evaluator, smallest_count};
+use bevy_gs4d::internal::offline::dataset::to_draw;
+use bevy_gs4d::internal::offline::measure::ReferencePictures;
+use bevy_gs4d::internal::offline::prune::{highest, select, smallest_count};
 use bevy_gs4d::offline::dataset::{CameraFile, CameraOptions, TrainingView};
 use bevy_gs4d::offline::engine::Engine;
-use bevy_gs4d::offline::metrics::MAX_PSNR;
+use bevy_gs4d::offline::measure::MAX_PSNR;
+use bevy_gs4d::offline::work::NoProgress;
 use bevy_gs4d::reference;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{GaussianScene, RuntimeScene};
@@ -22,13 +26,14 @@ const EMPTY_VIEWS: usize = 4;
 const SIZE: UVec2 = UVec2::new(48, 40);
 const FOV: f32 = 0.8;
 
-/// A scene, the scores of its Gaussians, and its views: first the views of the scene, then the views of the background alone.
+/// A scene, the scores of its Gaussians, and its views: first the views of the scene, then the views of the background
+/// alone.
 struct Setup {
     scene: GaussianScene,
     runtime: RuntimeScene,
     scores: Vec<f32>,
     views: Vec<TrainingView>,
-    /// The images, which are read when an evaluator is made.
+    /// The images, which are read when they become reference pictures.
     _folder: TempDir,
 }
 
@@ -66,13 +71,13 @@ impl Setup {
         Self { scene, runtime, scores, views, _folder: folder }
     }
 
-    /// Returns the smallest count whose PSNR is at most `loss` dB below that of the whole scene, and the PSNR of the whole scene.
-    fn choose(&self, evaluator: &Evaluator, loss: f64) -> (usize, f64) {
-        let engine = &mut Engine::Cpu;
-        let baseline = evaluator.psnr(engine, &self.runtime).expect("the scene can be drawn");
+    /// Returns the smallest count whose PSNR is at most `loss` dB below that of the whole scene, and the PSNR of the
+    /// whole scene.
+    fn choose(&self, references: &ReferencePictures, loss: f64) -> (usize, f64) {
+        let baseline = references.psnr(&mut Engine::Cpu, &self.runtime).expect("the scene can be drawn");
         let psnr = |count| {
-            let psnr = evaluator.psnr_of_highest(&mut Engine::Cpu, &self.scene, &self.scores, count);
-            psnr.map_err(|error| error.to_string())
+            let pruned = select(&self.scene, &highest(&self.scores, count));
+            references.psnr(&mut Engine::Cpu, &pruned.into_runtime().expect("a part of the scene can be drawn"))
         };
         let (count, trials) = smallest_count(COUNT, 1, baseline - loss, psnr).expect("the scene can be drawn");
         assert!(baseline.is_finite() && trials.iter().all(|trial| trial.psnr.is_finite()), "{baseline}: {trials:?}");
@@ -87,13 +92,13 @@ fn views_that_are_reproduced_exactly_do_not_change_the_chosen_number() {
         let setup = Setup::new(background);
         let color = Background::Color(background);
         let trained = &setup.scene.trained_with;
-        let evaluator = |views: &[TrainingView]| Evaluator::by_images(views, trained, color).expect("images");
+        let references = |views: &[TrainingView]| ReferencePictures::of_images(views, trained, color).expect("images");
         let (seen, empty) = setup.views.split_at(VIEWS);
-        let alone = evaluator(empty).psnr(&mut Engine::Cpu, &setup.runtime).expect("the scene can be drawn");
+        let alone = references(empty).psnr(&mut Engine::Cpu, &setup.runtime).expect("the scene can be drawn");
         assert_eq!(alone, MAX_PSNR, "the last views are reproduced exactly");
         for loss in [0.1, 1.0, 6.0] {
-            let (without, psnr) = setup.choose(&evaluator(seen), loss);
-            let (with, psnr_of_all) = setup.choose(&evaluator(&setup.views), loss);
+            let (without, psnr) = setup.choose(&references(seen), loss);
+            let (with, psnr_of_all) = setup.choose(&references(&setup.views), loss);
             assert!((10..COUNT).contains(&without), "some Gaussians are left out: {without}");
             let apart = with.abs_diff(without) as f64 / without as f64;
             assert!(
@@ -109,9 +114,9 @@ fn views_that_are_reproduced_exactly_do_not_change_the_chosen_number() {
 #[test]
 fn a_scene_that_reproduces_every_view_has_a_finite_psnr() {
     let setup = Setup::new([0.0; 3]);
-    let background = Background::Color([0.0; 3]);
-    let evaluator = Evaluator::by_scene(&mut Engine::Cpu, &setup.runtime, &setup.views, background);
-    let (count, psnr) = setup.choose(&evaluator.expect("the scene can be drawn"), 150.0);
+    let (background, views) = (Background::Color([0.0; 3]), to_draw(&setup.views, setup.runtime.trained_with.optics()));
+    let references = ReferencePictures::of_scene(&mut Engine::Cpu, &setup.runtime, views, background, &mut NoProgress);
+    let (count, psnr) = setup.choose(&references.expect("the scene can be drawn"), 150.0);
     assert_eq!(psnr, MAX_PSNR, "the scene is compared with its own pictures");
     assert!((1..COUNT).contains(&count), "a loss of 150 dB from the cap allows fewer: {count}");
 }

@@ -1,9 +1,10 @@
 //! Pictures of files whose splats move, against static files of the same splats at one time.
 //!
-//! In: splats on curved paths, written as Spacetime Gaussians, as a capture of splaTV and as parameters of Dynamic 3D Gaussians; the same splats
-//! as a static PLY, moved, turned and faded by the formulas of these formats. Out: proof that the import of each is drawn like the static file of
-//! that time.
+//! In: splats on curved paths, written as Spacetime Gaussians, as a capture of splaTV and as parameters of Dynamic 3D
+//! Gaussians; the same splats as a static PLY, moved, turned and faded by the formulas of these formats. Out: proof
+//! that the import of each is drawn like the static file of that time.
 
+use crate::support::psnr::psnr;
 use bevy_gs4d::codec::{self, ReadOptions};
 use bevy_gs4d::reference;
 use bevy_gs4d::view::{Background, Camera, Frame, RasterFov};
@@ -37,7 +38,7 @@ struct Splat {
     width: f32,
 }
 
-/// Returns a number from -1 to 1 that looks random, as a half float has it.
+/// Returns a pseudorandom number from -1 to 1 that a half float represents exactly.
 fn spread(splat: usize, lane: usize) -> f32 {
     let word = (splat as u32 * 64 + lane as u32 + 1).wrapping_mul(0x9e37_79b9);
     let word = (word ^ (word >> 15)).wrapping_mul(0x85eb_ca6b);
@@ -89,7 +90,7 @@ fn logit(alpha: f64) -> f64 {
     (alpha / (1.0 - alpha)).ln()
 }
 
-/// Returns a PLY with these properties, of rows of so many floats.
+/// Returns a binary PLY of rows with these float properties.
 fn ply(properties: &[String], values: &[f64]) -> Vec<u8> {
     let count = values.len() / properties.len();
     let lines: String = properties.iter().map(|name| format!("property float {name}\n")).collect();
@@ -210,37 +211,36 @@ fn draw(path: &Path, time: f32) -> Frame {
     reference::render(&scene, &camera.view(time, RasterFov::Corrected), Background::Color([0.0; 3]))
 }
 
-/// Checks the pictures of a file against those of static files, which have at least `due` decibels.
+/// Checks the pictures of a file against those of static files: the PSNR is at least `due` dB.
 fn check(name: &str, file: &[u8], splats: &[Splat], fades: bool, due: f64) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let (moving, static_ply) = (folder.path().join(name), folder.path().join("still.ply"));
     fs::write(&moving, file).expect("the folder can be written to");
     for time in TIMES {
         fs::write(&static_ply, still(splats, time, fades)).expect("the folder can be written to");
-        let [found, expected] = [&moving, &static_ply].map(|path| draw(path, time).picture.pixels);
-        let lit = expected.iter().filter(|pixel| pixel.max_element() > 0.1).count();
+        let [found, expected] = [&moving, &static_ply].map(|path| draw(path, time));
+        let lit = expected.picture.pixels.iter().filter(|pixel| pixel.max_element() > 0.1).count();
         assert!(lit > 500, "{name} at {time}: {lit} pixels show something");
-        let squares: f32 = found.iter().zip(&expected).map(|(a, b)| (*a - *b).length_squared()).sum();
-        let decibels = 10.0 * (3.0 * found.len() as f64 / f64::from(squares.max(1e-30))).log10();
+        let decibels = psnr(&found, &expected);
         eprintln!("{name} at {time}: {decibels:.1} dB");
-        assert!(decibels >= due, "{name} at {time}: {decibels:.1} dB, and {due} are due");
+        assert!(decibels >= due, "{name} at {time}: {decibels:.1} dB, at least {due} expected");
     }
 }
 
 #[test]
-fn spacetime_gaussians_are_drawn_as_static_ones_of_each_time() {
+fn spacetime_gaussians_are_drawn_as_static_gaussians_of_each_time() {
     let splats = splats(true);
     check("capture.ply", &spacetime(&splats), &splats, true, 60.0);
 }
 
 #[test]
-fn captures_of_splatv_are_drawn_as_static_ones_of_each_time() {
+fn captures_of_splatv_are_drawn_as_static_gaussians_of_each_time() {
     let splats = splats(true);
     check("capture.splatv", &splatv(&splats), &splats, true, 60.0);
 }
 
 #[test]
-fn tracked_gaussians_are_drawn_as_static_ones_of_each_frame() {
+fn tracked_gaussians_are_drawn_as_static_gaussians_of_each_frame() {
     let splats = splats(false);
     check("params.npz", &tracked(&splats), &splats, false, 120.0);
 }

@@ -1,13 +1,14 @@
 //! Pictures of files of other makes.
 //!
-//! In: exports of synthetic scenes, and the files in `formats/` of the folder that `GS4D_DATA` names. Out: proof that a file is drawn as its scene
-//! saved as a package, that an export is drawn as the scene it was made from, that a second export is drawn as the first, and that files of one
-//! scene in several formats are drawn alike.
+//! In: exports of synthetic scenes, and the files in `formats/` of the folder that `GS4D_DATA` names. Out: proof that a
+//! file is drawn as its scene saved as a package, that an export is drawn as the scene it was made from, that a second
+//! export is drawn as the first, and that files of one scene in several formats are drawn alike.
 
 use crate::support::data::data;
-use crate::support::skip::skip;
+use crate::support::other_makes::fixture;
+use crate::support::psnr::psnr;
 use bevy_gs4d::codec::{self, ReadOptions, package};
-use bevy_gs4d::internal::codec::export::{EXPORTS, Exporter};
+use bevy_gs4d::internal::codec::{EXPORTS, Exporter};
 use bevy_gs4d::reference;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{GaussianScene, RuntimeScene, UpAxis};
@@ -21,12 +22,12 @@ const FIELD_OF_VIEW: f32 = 0.9;
 /// Half turns, by which files of y up and of y down differ.
 const ABOUT_X: Mat3 = Mat3::from_cols(Vec3::X, Vec3::NEG_Y, Vec3::NEG_Z);
 const ABOUT_Z: Mat3 = Mat3::from_cols(Vec3::NEG_X, Vec3::NEG_Y, Vec3::Z);
-const NOT: Mat3 = Mat3::IDENTITY;
-/// The part of the clip that is drawn.
+const UNTURNED: Mat3 = Mat3::IDENTITY;
+/// The fraction of the clip at which pictures are drawn.
 const TIME: f32 = 0.4;
 
-/// A format, how its import is turned against a scene of y down, and what its pictures have at least, decibels: that of the first export against the
-/// scene, and that of the second export against the first; `None` if these files are equal.
+/// A format, the rotation of its import relative to a scene with y down, and the least PSNR of its pictures in dB: of
+/// the first export to the scene, and of the second export to the first; `None` if the two files are equal.
 struct Loss {
     id: &'static str,
     turn: Mat3,
@@ -35,33 +36,38 @@ struct Loss {
 }
 
 const LOSSES: [Loss; 8] = [
-    Loss { id: "ply", turn: NOT, first: 90.0, second: None },
+    Loss { id: "ply", turn: UNTURNED, first: 90.0, second: None },
     Loss { id: "gltf", turn: ABOUT_X, first: 90.0, second: Some(120.0) },
-    Loss { id: "free-time", turn: NOT, first: 120.0, second: Some(120.0) },
-    Loss { id: "splat", turn: NOT, first: 34.0, second: Some(60.0) },
+    Loss { id: "free-time", turn: UNTURNED, first: 120.0, second: Some(120.0) },
+    Loss { id: "splat", turn: UNTURNED, first: 34.0, second: Some(60.0) },
     Loss { id: "spz", turn: ABOUT_X, first: 34.0, second: Some(60.0) },
-    Loss { id: "sog", turn: NOT, first: 50.0, second: Some(60.0) },
-    Loss { id: "sogst", turn: NOT, first: 50.0, second: Some(60.0) },
-    Loss { id: "4dgs", turn: NOT, first: 40.0, second: Some(50.0) },
+    Loss { id: "sog", turn: UNTURNED, first: 50.0, second: Some(60.0) },
+    Loss { id: "sogst", turn: UNTURNED, first: 50.0, second: Some(60.0) },
+    Loss { id: "4dgs", turn: UNTURNED, first: 40.0, second: Some(50.0) },
 ];
 
-/// Files of one scene, the first of them with single precision: each with its turn against the first, and the decibels of its picture.
+/// Files of one scene, the first in single precision: each with its rotation relative to the first, and the least PSNR
+/// of its picture in dB.
 const ALIKE: [&[(&str, Mat3, f64)]; 5] = [
     &[
-        ("splat-transform/cloud_sh3.ply", NOT, 0.0),
+        ("splat-transform/cloud_sh3.ply", UNTURNED, 0.0),
         ("splat-transform/cloud_sh3.glb", ABOUT_Z, 60.0),
-        ("splat-transform/cloud_sh3.spz", NOT, 30.0),
-        ("splat-transform/cloud_mip.spz", NOT, 30.0),
-        ("splat-transform/cloud_sh3.compressed.ply", NOT, 30.0),
-        ("splat-transform/cloud_sh3.sog", NOT, 30.0),
+        ("splat-transform/cloud_sh3.spz", UNTURNED, 30.0),
+        ("splat-transform/cloud_mip.spz", UNTURNED, 30.0),
+        ("splat-transform/cloud_sh3.compressed.ply", UNTURNED, 30.0),
+        ("splat-transform/cloud_sh3.sog", UNTURNED, 30.0),
     ],
-    &[("playcanvas/biker.compressed.ply", NOT, 0.0), ("playcanvas/biker.spz", ABOUT_X, 30.0)],
-    &[("sogst/fountain_d1_sh2_seg.ply", NOT, 0.0), ("sogst/fountain_d1_sh2_seg.sogst", NOT, 30.0)],
-    &[("sogst/arc_d2_sh0_mono.ply", NOT, 0.0), ("sogst/arc_d2_sh0_mono.sogst", NOT, 30.0)],
-    &[("sog4d/swarm.ply", NOT, 0.0), ("sog4d/swarm_kmeans.sog4d", NOT, 30.0), ("sog4d/swarm_q16.sog4d", NOT, 30.0)],
+    &[("playcanvas/biker.compressed.ply", UNTURNED, 0.0), ("playcanvas/biker.spz", ABOUT_X, 30.0)],
+    &[("sogst/fountain_d1_sh2_seg.ply", UNTURNED, 0.0), ("sogst/fountain_d1_sh2_seg.sogst", UNTURNED, 30.0)],
+    &[("sogst/arc_d2_sh0_mono.ply", UNTURNED, 0.0), ("sogst/arc_d2_sh0_mono.sogst", UNTURNED, 30.0)],
+    &[
+        ("sog4d/swarm.ply", UNTURNED, 0.0),
+        ("sog4d/swarm_kmeans.sog4d", UNTURNED, 30.0),
+        ("sog4d/swarm_q16.sog4d", UNTURNED, 30.0),
+    ],
 ];
 
-/// A camera before it has a time.
+/// A camera without a time.
 #[derive(Clone, Copy)]
 struct Eye {
     at: Vec3,
@@ -70,7 +76,8 @@ struct Eye {
 }
 
 impl Eye {
-    /// Returns a camera before the middle of a scene, so far that it sees most of it but its outliers.
+    /// Returns a camera that looks at the median of a scene, from a distance at which all but outliers are in the
+    /// picture.
     fn of(scene: &RuntimeScene) -> Self {
         let means: Vec<Vec3> = scene.iter().map(|gaussian| Vec3::from(gaussian.mean)).collect();
         let median = |value: &dyn Fn(&Vec3) -> f32| {
@@ -100,23 +107,13 @@ fn runtime(scene: GaussianScene) -> RuntimeScene {
     scene.into_runtime().expect("it can be drawn")
 }
 
-/// Returns the peak signal-to-noise ratio of two pictures whose colors are clamped, decibels.
-fn psnr(a: &Frame, b: &Frame) -> f64 {
-    let colors = |frame: &Frame| -> Vec<f32> {
-        frame.picture.pixels.iter().flat_map(|pixel| pixel.clamp(Vec3::ZERO, Vec3::ONE).to_array()).collect()
-    };
-    let (a, b) = (colors(a), colors(b));
-    let squares: f64 = a.iter().zip(&b).map(|(a, b)| f64::from(a - b).powi(2)).sum();
-    10.0 * (a.len() as f64 / squares.max(1e-30)).log10()
-}
-
-/// Checks that a picture is one of something.
+/// Checks that a picture is not empty.
 fn assert_visible(frame: &Frame, what: &str) {
     let covered = frame.transmittance.iter().filter(|transmittance| **transmittance < 0.9).count();
     assert!(covered > 100, "{what}: {covered} pixels show something");
 }
 
-/// Returns the scene of a package of a scene.
+/// Writes a scene as a package, and reads it again.
 fn saved(scene: &GaussianScene) -> GaussianScene {
     let mut file = Vec::new();
     package::write(&mut file, scene, &package::WriteSettings { level: 1 }).expect("it can be saved");
@@ -141,7 +138,7 @@ fn time_of(scene: &GaussianScene) -> f32 {
 }
 
 #[test]
-fn exports_are_drawn_as_their_scene_and_again_after_a_second_export() {
+fn exports_and_second_exports_are_drawn_as_their_scene() {
     let mut scene = synthesize(&SynthSettings { count: 600, ..SynthSettings::default() });
     scene.playback.up = UpAxis::NegY;
     scene.form.truncate_colors(3, 0);
@@ -170,7 +167,7 @@ fn exports_are_drawn_as_their_scene_and_again_after_a_second_export() {
         };
         let (first_file, once) = export(&scene, time);
         check_saved(&once, id);
-        // A file of motion has its own unit of time.
+        // Formats with motion have their own unit of time.
         let own_time = time_of(&once);
         let (second_file, twice) = export(&once, own_time);
         assert!(loss.second.is_some() || first_file == second_file, "{id}: the second file is the first");
@@ -185,15 +182,13 @@ fn exports_are_drawn_as_their_scene_and_again_after_a_second_export() {
 
 #[test]
 fn files_of_other_makes_are_drawn_as_their_packages_and_alike_in_every_format() {
-    let Some(folder) = data() else { return };
+    if data().is_none() {
+        return;
+    }
     for files in ALIKE {
         let mut expected = None;
         for &(name, turn, due) in files {
-            let path = folder.join("formats").join(name);
-            if !path.exists() {
-                skip(format!("GS4D_DATA has no formats/{name}"));
-                continue;
-            }
+            let Some(path) = fixture(name) else { continue };
             let scene = codec::load(&path, &ReadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
             check_saved(&scene, name);
             let (time, drawn) = (time_of(&scene), runtime(scene));
@@ -204,7 +199,7 @@ fn files_of_other_makes_are_drawn_as_their_packages_and_alike_in_every_format() 
             assert_visible(picture, name);
             let found = psnr(&draw(&drawn, &eye.turned(turn).view(time)), picture);
             eprintln!("{name}: {found:.1} dB");
-            assert!(found >= due, "{name}: {found:.1} dB, and {due} are due");
+            assert!(found >= due, "{name}: {found:.1} dB, at least {due} expected");
         }
     }
 }

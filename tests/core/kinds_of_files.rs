@@ -1,28 +1,29 @@
-//! What a file is: by its contents, inside of gzip and of zip archives, in folders; and what is no capture.
+//! Recognizing files: by their contents, inside gzip and zip archives, and in folders; and files that are not captures.
 //!
-//! In: small captures made here, under right and wrong names, packed, beside others, and files that are something else. Out: proof that each is read as
-//! its contents say, or named with a remedy.
+//! In: small captures made here, under right and wrong names, packed, beside others, and files that are something else.
+//! Out: proof that each is read as its contents say, or named with a remedy.
 
+use crate::support::gzip::gzip;
 use crate::support::pth::archive;
+use crate::support::trained::trained_mut;
 use bevy_gs4d::codec::package::{self, WriteSettings};
 use bevy_gs4d::codec::{ReadOptions, inspect, load};
-use bevy_gs4d::internal::codec::export::{Export, Exporter};
 use bevy_gs4d::internal::codec::read_bytes;
+use bevy_gs4d::internal::codec::{Export, Exporter};
+use bevy_gs4d::scene::GaussianScene;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
-use bevy_gs4d::scene::{GaussianScene, SceneForm, Trained};
-use flate2::Compression;
-use flate2::write::GzEncoder;
 use std::fs;
-use std::io::{Cursor, Read, Write};
+use std::io::{Cursor, Read};
 use std::path::Path;
 use tempfile::TempDir;
 use zip::ZipArchive;
 
 /// A PLY of one Gaussian at rest.
 const PLY: &str = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n\
-    property float f_dc_0\nproperty float f_dc_1\nproperty float f_dc_2\nproperty float opacity\nproperty float scale_0\n\
-    property float scale_1\nproperty float scale_2\nproperty float rot_0\nproperty float rot_1\nproperty float rot_2\n\
-    property float rot_3\nend_header\n1 2 3 0.5 0.25 -0.5 1 -2 -3 -4 1 0 0 0\n";
+    property float f_dc_0\nproperty float f_dc_1\nproperty float f_dc_2\nproperty float opacity\n\
+    property float scale_0\nproperty float scale_1\nproperty float scale_2\nproperty float rot_0\n\
+    property float rot_1\nproperty float rot_2\nproperty float rot_3\nend_header\n\
+    1 2 3 0.5 0.25 -0.5 1 -2 -3 -4 1 0 0 0\n";
 
 fn folder() -> TempDir {
     tempfile::tempdir().expect("a temporary folder")
@@ -45,12 +46,6 @@ fn refusal(name: &str, bytes: &[u8]) -> String {
     load(&folder.path().join(name), &ReadOptions::default()).expect_err("it is refused").to_string()
 }
 
-fn gzip(bytes: &[u8]) -> Vec<u8> {
-    let mut writer = GzEncoder::new(Vec::new(), Compression::fast());
-    writer.write_all(bytes).expect("memory can be written to");
-    writer.finish().expect("memory can be written to")
-}
-
 fn zip(entries: &[(&str, &[u8])]) -> Vec<u8> {
     archive(&entries.iter().map(|(name, bytes)| ((*name).to_owned(), bytes.to_vec())).collect::<Vec<_>>())
 }
@@ -70,7 +65,7 @@ fn unzip(bytes: &[u8]) -> Vec<(String, Vec<u8>)> {
 /// Returns a file of this export, of a few Gaussians at rest.
 fn exported(id: &str) -> Vec<u8> {
     let mut scene = synthesize(&SynthSettings { count: 40, ..SynthSettings::default() });
-    let SceneForm::Trained(Trained { parameters, .. }) = &mut scene.form else { panic!("the trained form") };
+    let parameters = &mut trained_mut(&mut scene).parameters;
     (parameters.mean_t, parameters.log_scale_t, parameters.rotation_r) = Default::default();
     scene.form.truncate_colors(1, 0);
     let exporter = Exporter::new(scene, Export::of_id(id).expect("a format"), 30.0).expect("it can be exported");
@@ -99,7 +94,7 @@ fn package() -> Vec<u8> {
 }
 
 #[test]
-fn contents_decide_whatever_the_name() {
+fn contents_decide_the_format_whatever_the_name() {
     let folder = folder();
     let files = [("ply", PLY.as_bytes().to_vec()), ("gs4d", package())];
     let exports =
@@ -152,7 +147,7 @@ fn the_only_capture_of_a_zip_archive_is_read() {
     let (scene, lost) = read_bytes(Path::new("a.zip"), &zip(&entries)).expect("one capture");
     let (expected, _) = read_bytes(Path::new("a.ply"), ply).expect("a PLY");
     assert!(scene == expected, "the scene of the PLY");
-    assert_eq!(lost, ["It is a zip archive, of which x/scene.ply is shown."], "which one it is is stated");
+    assert_eq!(lost, ["It is a zip archive, of which x/scene.ply is shown."], "the entry that is shown is stated");
     let bytes = exported("sog");
     let (inner, _) = read_bytes(Path::new("a.zip"), &zip(&[("b.sog", &bytes)])).expect("an archive in it");
     let (expected, _) = read_bytes(Path::new("b.sog"), &bytes).expect("a SOG");
@@ -244,7 +239,7 @@ fn the_folder_of_a_sog_is_its_meta_json() {
     for name in ["other/f1.ply", "other/f2.ply"] {
         write(&folder, name, PLY.as_bytes());
     }
-    assert_eq!(read(&folder.path().join("other")).len(), 2, "a sequence beside a meta.json that is none of a SOG");
+    assert_eq!(read(&folder.path().join("other")).len(), 2, "a sequence beside a meta.json that is not of a SOG");
 }
 
 #[test]
@@ -268,7 +263,7 @@ fn the_folder_of_a_streamed_sog_is_its_lod_meta_json() {
 }
 
 #[test]
-fn a_mark_before_json_is_skipped() {
+fn a_byte_order_mark_before_json_is_skipped() {
     let folder = folder();
     let meta = sog(&folder, "", &exported("sog"));
     let expected = read(&folder.path().join("meta.json"));
@@ -311,7 +306,7 @@ fn pipes_and_devices_are_refused_without_waiting_for_them() {
     let pipe = folder.path().join("pipe.ply");
     let made = Command::new("mkfifo").arg(&pipe).status();
     assert!(made.is_ok_and(|status| status.success()), "a named pipe can be made");
-    let message = load(&pipe, &ReadOptions::default()).expect_err("nobody writes").to_string();
+    let message = load(&pipe, &ReadOptions::default()).expect_err("the pipe has no writer").to_string();
     assert!(message.contains("pipe.ply: is a pipe or a device"), "{message}");
     let textures: Vec<&str> = meta.split('"').filter(|word| word.ends_with(".webp")).collect();
     let texture = folder.path().join(textures[0]);

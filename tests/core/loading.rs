@@ -1,9 +1,10 @@
 //! The memory used by loading.
 //!
-//! In: a synthetic package, and with `GS4D_DATA` set a real checkpoint and the package made from it. Out: proof that loading a
-//! capture until it can be drawn never allocates more than three times the size of its file. The allocator counts for all threads of
-//! the process, so that each of these tests runs in its own process.
+//! In: a synthetic package, and with `GS4D_DATA` set a real checkpoint and the package made from it. Out: proof that
+//! loading a capture until it can be drawn never allocates more than three times the size of its file. The allocator
+//! counts for all threads of the process, so that each of these tests runs in its own process.
 
+use crate::support::allocations::{ALLOCATED, PEAK};
 use crate::support::data::data;
 use crate::support::own_process::run_alone;
 use bevy_gs4d::codec::package::WriteSettings;
@@ -11,40 +12,13 @@ use bevy_gs4d::codec::{self, ReadOptions};
 use bevy_gs4d::offline;
 use bevy_gs4d::scene::GaussianScene;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
-use std::alloc::{GlobalAlloc, Layout, System};
 use std::path::Path;
-use std::sync::atomic::{AtomicUsize, Ordering};
-
-/// The allocator of the system, with counters. Growing a block counts the old and the new block, as if the block were moved.
-struct Counting;
-
-static NOW: AtomicUsize = AtomicUsize::new(0);
-static PEAK: AtomicUsize = AtomicUsize::new(0);
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
-
-#[expect(unsafe_code, reason = "an allocator cannot be written without")]
-// SAFETY: both functions pass the arguments to `System` under the contract of the caller and return its result.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        let now = NOW.fetch_add(layout.size(), Ordering::Relaxed) + layout.size();
-        PEAK.fetch_max(now, Ordering::Relaxed);
-        // SAFETY: the caller keeps the contract, which is the same.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, block: *mut u8, layout: Layout) {
-        NOW.fetch_sub(layout.size(), Ordering::Relaxed);
-        // SAFETY: as above; the block came from `System`.
-        unsafe { System.dealloc(block, layout) }
-    }
-}
+use std::sync::atomic::Ordering;
 
 /// Loads until the scene could be drawn, and compares the peak with the size of the file.
 fn check(path: &Path) {
     let size = path.metadata().expect("the file is there").len() as usize;
-    let before = NOW.load(Ordering::Relaxed);
+    let before = ALLOCATED.load(Ordering::Relaxed);
     PEAK.store(before, Ordering::Relaxed);
     let scene = codec::load(path, &ReadOptions::default()).expect("the file can be read");
     let scene = scene.into_runtime().expect("the scene can be drawn");
@@ -59,7 +33,7 @@ fn check(path: &Path) {
 fn check_package(scene: &GaussianScene) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("scene.gs4d");
-    offline::save(&path, scene, &WriteSettings::default()).expect("the folder can be written to");
+    offline::work::save(&path, scene, &WriteSettings::default()).expect("the folder can be written to");
     check(&path);
 }
 

@@ -47,20 +47,27 @@ mod thin;
 
 #[path = "../support"]
 mod support {
+    #[cfg(feature = "offline")]
+    pub mod allocations;
     pub mod blob;
     pub mod coded_scene;
     pub mod data;
     pub mod golden;
     pub mod golden_gradients;
+    pub mod gray;
+    pub mod gzip;
     #[cfg(feature = "offline")]
     pub mod npy;
+    pub mod other_makes;
     #[cfg(feature = "offline")]
     pub mod own_process;
     pub mod package_parts;
     #[cfg(feature = "offline")]
     pub mod packed_scene;
+    pub mod psnr;
     pub mod pth;
     pub mod random;
     pub mod skip;
     pub mod thin;
+    pub mod trained;
 }

@@ -1,9 +1,10 @@
 //! Pictures that would fill the memory.
 //!
-//! In: small files made here that state many times their size, or hold it packed. Out: proof that they are refused before they are decoded, with their
-//! claim and the limit, and that packed chunks of a PNG which change no pixel change nothing.
+//! In: small files made here that state many times their size, or hold it packed. Out: proof that they are refused
+//! before they are decoded, with their claim and the limit, and that compressed chunks of a PNG other than its pixels
+//! are ignored.
 
-use bevy_gs4d::internal::offline::picture_file::{PictureError, open, size};
+use bevy_gs4d::offline::picture_file::{PictureError, open, size};
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
 use glam::UVec2;
@@ -56,7 +57,7 @@ fn color_profiles_and_texts_of_a_png_change_nothing() {
 }
 
 #[test]
-fn a_png_of_more_pixels_than_so_few_bytes_may_have_is_refused() {
+fn a_png_that_claims_more_pixels_than_its_bytes_can_hold_is_refused() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let (_, mut bytes) = png();
     bytes[16..20].copy_from_slice(&8000_u32.to_be_bytes());
@@ -72,7 +73,7 @@ fn a_png_of_more_pixels_than_so_few_bytes_may_have_is_refused() {
 }
 
 #[test]
-fn all_pixels_of_an_exr_count_and_not_only_those_that_are_shown() {
+fn the_size_of_an_exr_is_limited_by_its_data_window() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let mut bytes = Vec::new();
     OpenExrEncoder::new(Cursor::new(&mut bytes))

@@ -3,8 +3,9 @@
 //! In: synthetic pictures. Out: proof that metrics equal values computed by hand and by independent float64
 //! implementations, that PSNR is finite, and that pictures of different sizes are refused.
 
-use bevy_gs4d::internal::offline::metrics::MS_SSIM_MIN_SIDE;
-use bevy_gs4d::offline::metrics::{ImageMetrics, MAX_PSNR, MetricSet, SizeMismatch, SquaredError, flip, ms_ssim, ssim};
+use bevy_gs4d::internal::offline::measure::MS_SSIM_MIN_SIDE;
+use bevy_gs4d::offline::measure::{ImageMetrics, MAX_PSNR, MetricSet, SizeMismatch, SquaredError};
+use bevy_gs4d::offline::measure::{flip, ms_ssim, ssim};
 use bevy_gs4d::view::Picture;
 use glam::{UVec2, Vec3};
 use proptest::prelude::*;
@@ -228,9 +229,9 @@ fn two_pictures() -> impl Strategy<Value = (Picture, Picture)> {
 proptest! {
     #[test]
     fn metrics_are_symmetric_and_bounded((a, b) in two_pictures()) {
-        let (error, mirrored) = (SquaredError::of(&a, &b).expect("same size"), SquaredError::of(&b, &a).expect("same size"));
-        prop_assert_eq!(error, mirrored);
-        prop_assert_eq!(ssim(&a, &b), ssim(&b, &a));
+        let [error, mirrored] = [(&a, &b), (&b, &a)].map(|(a, b)| SquaredError::of(a, b).expect("same size"));
+        prop_assert_eq!(error, mirrored, "the order of the pictures does not change the error");
+        prop_assert_eq!(ssim(&a, &b), ssim(&b, &a), "nor the similarity");
         let similarity = ssim(&a, &b).expect("same size");
         prop_assert!((-1.0..=1.0 + 1e-12).contains(&similarity), "{}", similarity);
         let (mean, pooled) = (error.channel_psnr(), error.psnr());

@@ -1,17 +1,16 @@
 //! Checkpoints of other trainers, and of torch before 1.6.
 //!
-//! In: small checkpoints of gsplat and of nerfstudio, made here, also with what is not known and with what is wrong; checkpoints of the 4DGS trainer in
-//! the format of torch before 1.6. Out: the values of their Gaussians, or why they are refused.
+//! In: small checkpoints of gsplat and of nerfstudio, made here, also with unknown and with wrong entries; checkpoints
+//! of the 4DGS trainer in the format of torch before 1.6. Out: the values of their Gaussians, or why they are refused.
 
+use crate::checkpoint_poison::read;
 use crate::support::pth::{self, Pth};
-use bevy_gs4d::codec::checkpoint::{self, CheckpointError};
+use crate::support::trained::trained;
 use bevy_gs4d::codec::{ReadOptions, load};
-use bevy_gs4d::gaussian::{Harmonics, Parameters};
 use bevy_gs4d::internal::codec::{read_beside, read_bytes};
-use bevy_gs4d::scene::{GaussianScene, SceneForm, Trained, UpAxis};
+use bevy_gs4d::scene::{GaussianScene, UpAxis};
 use bevy_gs4d::view::RasterFov;
 use std::fs;
-use std::io::Cursor;
 use std::path::Path;
 
 /// Number of Gaussians.
@@ -54,7 +53,7 @@ impl Named {
         all
     }
 
-    /// Adds a tensor whose values begin so and grow by 1/64.
+    /// Adds a tensor whose values start at `first` and increase by 1/64.
     fn add(&mut self, name: &str, shape: &[usize], first: f32) {
         let stride: Vec<usize> = (1..=shape.len()).map(|axis| shape[axis..].iter().product()).collect();
         let values: Vec<f32> = (0..shape.iter().product()).map(|at| value(first, at)).collect();
@@ -95,24 +94,13 @@ fn of_class(tensor: &[u8], class: &str) -> Vec<u8> {
     [&tensor[..at], class.as_bytes(), &tensor[at + FLOATS.len()..]].concat()
 }
 
-fn read(bytes: &[u8]) -> Result<GaussianScene, CheckpointError> {
-    checkpoint::read(Cursor::new(bytes), &ReadOptions::default(), None)
-}
-
 fn refusal(bytes: &[u8]) -> String {
     read(bytes).expect_err("it is refused").to_string()
 }
 
-fn trained(scene: &GaussianScene) -> (&Parameters, &Harmonics) {
-    match &scene.form {
-        SceneForm::Trained(Trained { parameters, harmonics }) => (parameters, harmonics),
-        SceneForm::Ready(_) => panic!("Gaussians at rest are in the trained form"),
-    }
-}
-
 /// Checks the values of all Gaussians but their colors.
 fn check(scene: &GaussianScene) {
-    let (parameters, _) = trained(scene);
+    let parameters = &trained(scene).parameters;
     assert_eq!(parameters.mean, [0, 1, 2].map(|row| three(1.0, row)), "means");
     assert_eq!(parameters.log_scale, [0, 1, 2].map(|row| three(-1.5, row)), "logarithms of scales");
     assert_eq!(parameters.opacity_logit, [0, 1, 2].map(|row| value(0.25, row)), "logits of opacities");
@@ -128,7 +116,7 @@ fn a_checkpoint_of_gsplat_has_its_gaussians() {
     for degree in 0..=3 {
         let scene = read(&Named::gsplat(degree).file("splats", &[])).expect("a checkpoint of gsplat");
         check(&scene);
-        let (_, harmonics) = trained(&scene);
+        let harmonics = &trained(&scene).harmonics;
         assert_eq!(harmonics.degree as usize, degree, "degree of color");
         for row in 0..COUNT {
             assert_eq!(harmonics.of(row)[..3], three(0.75, row), "coefficients of degree 0");
@@ -154,7 +142,7 @@ fn a_checkpoint_of_nerfstudio_has_its_gaussians_whatever_else_is_in_it() {
     for degree in 1..=3 {
         let scene = read(&Named::splatfacto(degree).file("pipeline", &more)).expect("a checkpoint of nerfstudio");
         check(&scene);
-        let (_, harmonics) = trained(&scene);
+        let harmonics = &trained(&scene).harmonics;
         assert_eq!(
             (harmonics.degree as usize, harmonics.of(1)[..3].to_vec()),
             (degree, three(0.75, 1).to_vec()),
@@ -171,7 +159,7 @@ fn a_checkpoint_of_nerfstudio_has_its_gaussians_whatever_else_is_in_it() {
 fn without_coefficients_splatfacto_learns_logits_of_colors() {
     let scene = read(&Named::splatfacto(0).file("pipeline", &[])).expect("a checkpoint of nerfstudio");
     check(&scene);
-    let (_, harmonics) = trained(&scene);
+    let harmonics = &trained(&scene).harmonics;
     for row in 0..COUNT {
         let expected = three(0.75, row).map(|logit| (1.0 / (1.0 + (-logit).exp()) - 0.5) / 0.282_094_8);
         assert_eq!((harmonics.degree, harmonics.of(row)), (0, &expected[..]), "colors of Gaussian {row}");
@@ -179,19 +167,23 @@ fn without_coefficients_splatfacto_learns_logits_of_colors() {
 }
 
 #[test]
-fn what_a_scene_does_not_show_of_another_trainer_is_stated() {
+fn parts_of_other_checkpoints_that_a_scene_does_not_show_are_stated() {
     let said = |bytes: &[u8]| read_bytes(Path::new("a.pt"), bytes).expect("a checkpoint").1.join(" ");
     let mut fourth = Named::gsplat(4);
     let lost = said(&fourth.file("splats", &[("app_module", b"}")]));
     for part in ["degree 4, 9 coefficients of each of 3", "-y", "--up +z", "single pictures"] {
         assert!(lost.contains(part), "{part}: {lost}");
     }
-    assert_eq!(trained(&read(&fourth.file("splats", &[])).expect("degree 4")).1.coefficients, 16, "degree 3 is kept");
+    assert_eq!(
+        trained(&read(&fourth.file("splats", &[])).expect("degree 4")).harmonics.coefficients,
+        16,
+        "degree 3 is kept"
+    );
     fourth.tensors.truncate(4);
     fourth.add("colors", &[COUNT, 3], 0.75);
     let bytes = fourth.file("splats", &[]);
     assert!(said(&bytes).contains("network of appearance"), "colors before the network");
-    let color = trained(&read(&bytes).expect("colors")).1.of(0)[0] * 0.282_094_8 + 0.5;
+    let color = trained(&read(&bytes).expect("colors")).harmonics.of(0)[0] * 0.282_094_8 + 0.5;
     assert!((color - 1.0 / (1.0 + (-0.75_f32).exp())).abs() < 1e-6, "{color} is the sigmoid of its logit");
     let mut odd = Named::gsplat(0);
     odd.storages[0][4] = f32::NAN;
@@ -204,7 +196,7 @@ fn what_a_scene_does_not_show_of_another_trainer_is_stated() {
 }
 
 #[test]
-fn what_is_wrong_with_another_checkpoint_is_named() {
+fn errors_of_other_checkpoints_name_the_fault() {
     let changed = |change: fn(&mut Named)| {
         let mut all = Named::gsplat(1);
         change(&mut all);
@@ -234,7 +226,7 @@ fn what_is_wrong_with_another_checkpoint_is_named() {
 fn legacy(pth: &Pth) -> Vec<u8> {
     let mut bytes = b"\x80\x02\x8a\x0a\x6c\xfc\x9c\x46\xf9\x20\x6a\xa8\x50\x19.\x80\x02M\xe9\x03.".to_vec();
     bytes.extend([&b"\x80\x02}("[..], &pth::text("little_endian"), b"\x88", &pth::text("type_sizes"), b"}u."].concat());
-    // The id of a storage ends with the part of another storage that it is.
+    // The id of a storage ends with its view of another storage: none here.
     let pickle = pth.pickle();
     let tail = [pth::text("cuda:0"), b"J".to_vec()].concat();
     let mut rest = &pickle[..];

@@ -1,13 +1,14 @@
 //! Picking: the Gaussian that a ray hits.
 //!
-//! In: Gaussians placed by hand, and a column of them with its render by the CPU reference. Out: proof that a ray hits the expected
-//! Gaussian at the expected point, and that settings are respected.
+//! In: Gaussians placed by hand, and a column of them with its render by the CPU reference. Out: proof that a ray hits
+//! the expected Gaussian at the expected point, and that settings are respected.
 
+use crate::support::gray::scene;
 use bevy_gs4d::gaussian::{Gaussian, Harmonics};
-use bevy_gs4d::internal::gaussian::alpha::alpha_at;
+use bevy_gs4d::internal::gaussian::alpha_at;
 use bevy_gs4d::internal::reference::{self, Splat};
-use bevy_gs4d::internal::scene::packed::SHARED_RANGES;
-use bevy_gs4d::internal::scene::packed::encode::Bits;
+use bevy_gs4d::internal::scene::Bits;
+use bevy_gs4d::internal::scene::SHARED_RANGES;
 use bevy_gs4d::reference::Layer;
 use bevy_gs4d::scene::{FilterKind, Form, PackedColors, PackedScene, Pick, PickSettings, RuntimeScene, TemporalFilter};
 use bevy_gs4d::view::{Appearance, Background, BlendSpace, Camera, RasterFov};
@@ -29,11 +30,6 @@ fn still(mean: Vec3, covariance: [f32; 6], opacity: f32) -> Gaussian {
 /// Returns a round Gaussian on the z axis.
 fn ball(z: f32, opacity: f32) -> Gaussian {
     still(Vec3::new(0.0, 0.0, z), [0.01, 0.0, 0.0, 0.01, 0.0, 0.01], opacity)
-}
-
-fn scene(gaussians: &[Gaussian]) -> RuntimeScene {
-    let harmonics = Harmonics { coefficients: 1, values: vec![0.0; gaussians.len() * 3], ..Harmonics::default() };
-    RuntimeScene::sliced(gaussians.to_vec(), harmonics)
 }
 
 /// Picks along +z from the origin.
@@ -233,9 +229,9 @@ fn is_close(splats: &[Splat], x: u32, y: u32) -> bool {
 }
 
 /// Splats are affine approximations and have a low-pass, so that their alphas differ from the alphas along the ray: for
-/// this scene, transmittances are up to 0.032 apart. Pixels where a transmittance is within 0.04 of one half are
-/// not compared; at all other pixels both must hit the same Gaussian. Depths are of different points
-/// (the mean of the splat, the densest point).
+/// this scene, transmittances are up to 0.032 apart. Pixels where a transmittance is within 0.04 of one half are not
+/// compared; at all other pixels both must hit the same Gaussian. Depths are of different points (the mean of the
+/// splat, the densest point).
 #[test]
 fn the_median_of_the_reference_render_is_hit() {
     let scene = scene(&column());

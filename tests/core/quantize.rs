@@ -8,13 +8,13 @@ use crate::support::packed_scene::{BLACK, scene, settings, view};
 use bevy_gs4d::codec::ReadOptions;
 use bevy_gs4d::codec::{self, package};
 use bevy_gs4d::gaussian::Gaussian;
-use bevy_gs4d::internal::offline::quantize::roundings;
-use bevy_gs4d::internal::scene::packed::encode::Bits;
-use bevy_gs4d::internal::scene::packed::order::{is_filler, morton_order};
-use bevy_gs4d::offline::convert::{ConvertSettings, TargetForm, convert};
+use bevy_gs4d::internal::offline::compress::roundings;
+use bevy_gs4d::internal::scene::Bits;
+use bevy_gs4d::internal::scene::{is_filler, morton_order};
+use bevy_gs4d::offline::compress::{CompressError, CompressSettings, Quality, compress};
 use bevy_gs4d::offline::dataset::{CameraFile, CameraOptions};
-use bevy_gs4d::offline::metrics::SquaredError;
-use bevy_gs4d::offline::quantize::{CompressError, CompressSettings, Quality, compress};
+use bevy_gs4d::offline::forms::{ConvertSettings, TargetForm, convert};
+use bevy_gs4d::offline::measure::SquaredError;
 use bevy_gs4d::reference;
 use bevy_gs4d::scene::{FilterKind, Form, GaussianScene, RuntimeScene, SceneForm, TemporalFilter};
 use bevy_gs4d::view::{Camera, RasterFov, View};
@@ -171,7 +171,7 @@ fn strays_do_not_lower_the_precision_of_other_gaussians() {
 }
 
 #[test]
-fn objects_far_apart_keep_their_digits() {
+fn objects_far_apart_keep_their_precision() {
     let mut both = RuntimeScene { filter: None, ..scene(4_000, 0, 0) };
     let away = Vec3::new(1e3, -200.0, 0.0);
     for gaussian in both.form.as_sliced_mut().expect("sliced").gaussians.iter_mut().skip(1).step_by(2) {
@@ -188,7 +188,7 @@ fn objects_far_apart_keep_their_digits() {
 }
 
 #[test]
-fn extreme_values_of_a_few_do_not_take_the_digits_of_the_others() {
+fn extreme_values_of_a_few_gaussians_do_not_lower_the_precision_of_the_others() {
     let mut scene = RuntimeScene { filter: None, ..scene(3_000, 0, 0) };
     let is_extreme = |index: u32| index.is_multiple_of(150);
     let gaussians = &mut scene.form.as_sliced_mut().expect("sliced").gaussians;

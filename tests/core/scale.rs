@@ -1,10 +1,10 @@
 //! Scenes of any scale: the same scene in units, in thousandths of a unit and in thousands of units.
 //!
-//! In: a PLY of three Gaussians, made here at several scales. Out: proof that its near limit, the cameras around it and its pictures follow the
-//! scale, so that a scene of millimeters is seen like one of meters.
+//! In: a PLY of three Gaussians, made here at several scales. Out: proof that its near limit, the cameras around it and
+//! its pictures follow the scale, so that a scene of millimeters is seen like one of meters.
 
 use bevy_gs4d::internal::codec::read_bytes;
-use bevy_gs4d::offline::orbit::orbit;
+use bevy_gs4d::offline::draw::orbit;
 use bevy_gs4d::reference::render;
 use bevy_gs4d::scene::RuntimeScene;
 use bevy_gs4d::view::{Background, Camera, NEAR, Picture, RasterFov};

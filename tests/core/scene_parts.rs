@@ -1,12 +1,12 @@
 //! Scenes with inconsistent parts, and colors by codebook with lowered degrees.
 //!
-//! In: scenes made here, consistent and inconsistent. Out: proof that `RuntimeScene::check` refuses every inconsistent scene, so that
-//! no index is out of range, and that lowering degrees changes no other coefficient.
+//! In: scenes made here, consistent and inconsistent. Out: proof that `RuntimeScene::check` refuses every inconsistent
+//! scene, so that no index is out of range, and that lowering degrees changes no other coefficient.
 
 use crate::support::coded_scene::coded_scene;
 use bevy_gs4d::codec::package::{self, PackageError, WriteSettings};
 use bevy_gs4d::gaussian::Harmonics;
-use bevy_gs4d::internal::scene::packed::RECORD_WORDS;
+use bevy_gs4d::internal::scene::RECORD_WORDS;
 use bevy_gs4d::scene::{ActiveSets, CodedColors, Environment, Form, GaussianScene, RuntimeScene};
 use bevy_gs4d::scene::{PackedColors, PackedScene};
 use std::io::Cursor;

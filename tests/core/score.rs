@@ -3,24 +3,25 @@
 //!
 //! In: synthetic scenes; with `GS4D_DATA` set, toybox and standup. Out: proof that the CPU reference of `score` is
 //! right pixel by pixel, that scores are related as defined, that pruning keeps the right Gaussians, and that filters
-//! contain the filters and masks they must contain. The comparisons over all training views take minutes: `.ci/full` runs them by name.
+//! contain the filters and masks they must contain. The comparisons over all training views take minutes: `.ci/full`
+//! runs them by name.
 
 use crate::support::data::data;
 use crate::support::npy;
 use bevy_gs4d::codec::{self, ReadOptions};
-use bevy_gs4d::internal::gaussian::alpha::{ALPHA_MAX, ALPHA_MIN, TRANSMITTANCE_MIN};
-use bevy_gs4d::internal::gaussian::conic::exponent;
-use bevy_gs4d::internal::offline::dataset::selection::{distinct_cameras, even_subset, to_draw};
+use bevy_gs4d::internal::gaussian::exponent;
+use bevy_gs4d::internal::gaussian::{ALPHA_MAX, ALPHA_MIN, TRANSMITTANCE_MIN};
+use bevy_gs4d::internal::offline::dataset::{distinct_cameras, even_subset, to_draw};
+use bevy_gs4d::internal::offline::filter::key_times;
+use bevy_gs4d::internal::offline::filter::{VisibilityMasks, mask_views};
 use bevy_gs4d::internal::offline::prune::{highest, kept_count, select};
 use bevy_gs4d::internal::offline::score::{CpuEngine, ScoreEngine, Traits, Want, score};
-use bevy_gs4d::internal::offline::seen::{Seen, drawings};
-use bevy_gs4d::internal::offline::shard::Shard;
-use bevy_gs4d::internal::offline::temporal_filter::key_times;
+use bevy_gs4d::internal::offline::store::Shard;
 use bevy_gs4d::internal::reference;
-use bevy_gs4d::offline::NoProgress;
 use bevy_gs4d::offline::dataset::{CameraOptions, Dataset, Split};
 use bevy_gs4d::offline::score::Variant;
 use bevy_gs4d::offline::score::{ScoreError, ScoreSettings, Scores};
+use bevy_gs4d::offline::work::NoProgress;
 use bevy_gs4d::reference::{Layer, render};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{FilterKind, GaussianScene, RuntimeScene, TemporalFilter};
@@ -271,11 +272,11 @@ fn interval_filters_contain_key_frame_filters_and_support_filters_contain_interv
     let times = key_times([0.0, 1.0], segments + 1);
     let mut engine = CpuEngine { scene: &scene, background: BACKGROUND };
     let between: Vec<View> = (0..30).map(|i| view(i as f32, (i as f32 + 0.5) / 30.0)).collect();
-    let drawings = drawings(&times, &cameras, &between, RasterFov::Reference, [0.0, 1.0]);
-    let seen = Seen::of_shard(&mut engine, &drawings, times.len(), count, Shard::WHOLE, &mut NoProgress);
-    let seen = seen.expect("views of the scene");
-    let [key_frame, interval] =
-        [FilterKind::KeyFrame, FilterKind::Interval].map(|kind| seen.filter(kind).expect("the cameras show the scene"));
+    let views = mask_views(&times, &cameras, &between, RasterFov::Reference, [0.0, 1.0]);
+    let masks = VisibilityMasks::of_shard(&mut engine, &views, times.len(), count, Shard::WHOLE, &mut NoProgress);
+    let masks = masks.expect("views of the scene");
+    let [key_frame, interval] = [FilterKind::KeyFrame, FilterKind::Interval]
+        .map(|kind| masks.filter(kind).expect("the cameras show the scene"));
     let support = TemporalFilter::support(scene.iter(), [0.0, 1.0], 0.05, segments);
     let within = |a: &TemporalFilter, b: &TemporalFilter| a.to_bits().iter().zip(b.to_bits()).all(|(a, b)| a & !b == 0);
     assert!(
@@ -383,9 +384,9 @@ fn key_frame_masks_match_the_independent_masks() {
         let mut engine = CpuEngine { scene: &runtime, background: Background::Color([0.0; 3]) };
         let (times, count) = (key_times([0.0, 1.0], keys), runtime.len());
         let raster_fov = runtime.trained_with.raster_fov;
-        let drawings = drawings(&times, &cameras, &[], raster_fov, [0.0, 1.0]);
-        let seen = Seen::of_shard(&mut engine, &drawings, times.len(), count, Shard::WHOLE, &mut NoProgress);
-        let masks = seen.expect("views of the capture").masks;
+        let views = mask_views(&times, &cameras, &[], raster_fov, [0.0, 1.0]);
+        let masks = VisibilityMasks::of_shard(&mut engine, &views, times.len(), count, Shard::WHOLE, &mut NoProgress);
+        let masks = masks.expect("views of the capture").key_frames;
         let expected = values(&folder.join("masks.npz"), "vanilla", "|u1");
         let row = count.div_ceil(8);
         assert_eq!(expected.len(), row * masks.len(), "one mask for each key-frame");

@@ -1,15 +1,17 @@
 //! The score of the paper against closed forms.
 //!
-//! In: Gaussians of known volume, temporal mean and temporal variance, with given contributions or with the contributions of small
-//! Gaussians to known pixels. Out: proof that the temporal factor, the volume factor, the spatial score and their sum over views match the
-//! paper. The expected values are computed here in double precision, derivatives of the marginal by finite differences.
+//! In: Gaussians of known volume, temporal mean and temporal variance, with given contributions or with the
+//! contributions of small Gaussians to known pixels. Out: proof that the temporal factor, the volume factor, the
+//! spatial score and their sum over views match the paper. The expected values are computed here in double precision,
+//! derivatives of the marginal by finite differences.
 
+use crate::support::trained::trained_mut;
 use bevy_gs4d::internal::offline::score::{CpuEngine, ScoreEngine, Traits, ViewScore, Want, score};
-use bevy_gs4d::offline::NoProgress;
 use bevy_gs4d::offline::score::Variant;
 use bevy_gs4d::offline::score::{ScoreError, ScoreSettings, Scores};
+use bevy_gs4d::offline::work::NoProgress;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
-use bevy_gs4d::scene::{GaussianScene, RuntimeScene, SceneForm};
+use bevy_gs4d::scene::{GaussianScene, RuntimeScene};
 use bevy_gs4d::view::{Background, Camera, RasterFov, View};
 use glam::{UVec2, Vec3};
 
@@ -72,8 +74,7 @@ fn steadiness(derivative: f64) -> f64 {
 /// Returns a scene in the trained form of these Gaussians.
 fn scene(gaussians: &[One]) -> GaussianScene {
     let mut scene = synthesize(&SynthSettings { count: gaussians.len(), ..SynthSettings::default() });
-    let SceneForm::Trained(trained) = &mut scene.form else { panic!("synthetic scenes are in the trained form") };
-    let parameters = &mut trained.parameters;
+    let parameters = &mut trained_mut(&mut scene).parameters;
     parameters.mean = gaussians.iter().map(|one| one.mean).collect();
     parameters.mean_t = gaussians.iter().map(|one| one.mean_t).collect();
     parameters.log_scale = gaussians.iter().map(|one| one.log_scale).collect();
@@ -164,12 +165,11 @@ fn the_temporal_variance_follows_the_model() {
     };
     let changed = |change: fn(&mut bevy_gs4d::gaussian::Parameters)| {
         let mut scene = scene(&[one]);
-        let SceneForm::Trained(trained) = &mut scene.form else { panic!("the trained form") };
-        change(&mut trained.parameters);
+        change(&mut trained_mut(&mut scene).parameters);
         scene
     };
-    // One isoclinic rotation by the angle a mixes time with one axis of space: Σ_44 = cos² a s_t² + sin² a s². The quaternion need not be
-    // of unit length.
+    // One isoclinic rotation by the angle a mixes time with one axis of space: Σ_44 = cos² a s_t² + sin² a s². The
+    // quaternion need not be of unit length.
     let turned = changed(|parameters| parameters.rotation_l[0] = [3.0 * 0.8, 3.0 * 0.6, 0.0, 0.0]);
     let variance = 0.64 * (-0.8f64).exp() + 0.36 * 1f64.exp();
     assert_close(score_at(&turned, Variant::Sigma, time), variance, "variance after a rotation in 4D");
@@ -239,7 +239,8 @@ fn the_reference_volume_is_at_nine_tenths_of_the_descending_volumes() {
 const SIZE: UVec2 = UVec2::splat(33);
 const FOV: f32 = 0.8;
 
-/// Returns the variance on the screen of a round Gaussian that is `distance` straight ahead, with the low-pass, pixels squared.
+/// Returns the variance on the screen of a round Gaussian that is `distance` straight ahead, with the low-pass, pixels
+/// squared.
 fn screen_variance(one: &One, distance: f64) -> f64 {
     let focal = f64::from(SIZE.x) / (2.0 * (f64::from(FOV) / 2.0).tan());
     (focal * f64::from(one.log_scale[0]).exp() / distance).powi(2) + 0.3

@@ -1,29 +1,18 @@
 //! The SOG family: files of other makes.
 //!
-//! In: the files of `formats/` in the folder of `GS4D_DATA`. Out: the numbers that another decoder finds in them.
+//! In: the files of `formats/` in the folder of `GS4D_DATA`. Out: proof that each file has the values that another
+//! decoder finds.
 
-use crate::support::data::data;
-use crate::support::skip::skip;
+use crate::support::other_makes::{fixture, opacity};
+use crate::support::trained::trained;
 use bevy_gs4d::codec::{self, ReadOptions};
-use bevy_gs4d::gaussian::{Gaussian, Harmonics, Parameters};
-use bevy_gs4d::scene::{ActiveSets, FilterKind, Form, GaussianScene, SceneForm, UpAxis};
+use bevy_gs4d::gaussian::{Gaussian, Harmonics};
+use bevy_gs4d::scene::{ActiveSets, FilterKind, Form, GaussianScene, SceneForm, Trained, UpAxis};
 use glam::{Mat3, Quat, Vec3};
 
-/// Returns the scene of a file; reports the test as skipped if it is not there.
+/// Returns the scene of a file; without the file, reports the skipped test and returns `None`.
 fn load(name: &str) -> Option<GaussianScene> {
-    let path = data()?.join("formats").join(name);
-    if !path.exists() {
-        skip(format!("{} is not there", path.display()));
-        return None;
-    }
-    Some(codec::load(&path, &ReadOptions::default()).unwrap_or_else(|error| panic!("{error}")))
-}
-
-fn at_rest(scene: &GaussianScene) -> (&Parameters, &Harmonics) {
-    match &scene.form {
-        SceneForm::Trained(trained) => (&trained.parameters, &trained.harmonics),
-        SceneForm::Ready(_) => panic!("Gaussians at rest are in the trained form"),
-    }
+    Some(codec::load(&fixture(name)?, &ReadOptions::default()).unwrap_or_else(|error| panic!("{error}")))
 }
 
 fn moving(scene: &GaussianScene) -> (&[Gaussian], &Harmonics) {
@@ -41,12 +30,8 @@ fn check(what: &str, found: &[f32], expected: &[f32]) {
     }
 }
 
-fn opacity(logit: f32) -> f32 {
-    1.0 / (1.0 + (-logit).exp())
-}
-
-/// One Gaussian as the other decoder finds it: mean, logarithms of scales, quaternion w x y z, opacity, coefficients of degree 0, and the first of
-/// degree 1.
+/// One Gaussian as the other decoder finds it: mean, logarithms of scales, quaternion w x y z, opacity, coefficients of
+/// degree 0, and the first of degree 1.
 struct Expected {
     mean: [f32; 3],
     log_scale: [f32; 3],
@@ -57,7 +42,7 @@ struct Expected {
 }
 
 fn check_at_rest(scene: &GaussianScene, index: usize, expected: &Expected) {
-    let (parameters, harmonics) = at_rest(scene);
+    let Trained { parameters, harmonics } = trained(scene);
     check("mean", &parameters.mean[index], &expected.mean);
     check("scales", &parameters.log_scale[index], &expected.log_scale);
     let found = parameters.rotation_l[index];
@@ -121,13 +106,13 @@ fn a_sog_of_splat_transform_has_the_values_that_another_decoder_finds() {
         rest: Some([-0.05498, 0.07198, 0.19099]),
     };
     check_at_rest(&scene, 199, &last);
-    assert_eq!(at_rest(&scene).1.degree, 3, "all coefficients");
+    assert_eq!(trained(&scene).harmonics.degree, 3, "all coefficients");
 }
 
 #[test]
 fn an_unbundled_sog_is_read_from_the_files_beside_its_meta_json() {
     let Some(scene) = load("playcanvas/playbot/6_0/meta.json") else { return };
-    assert_eq!((scene.len(), at_rest(&scene).1.degree), (1873, 2), "all Gaussians");
+    assert_eq!((scene.len(), trained(&scene).harmonics.degree), (1873, 2), "all Gaussians");
     let first = Expected {
         mean: [-1.0038, -0.021, -1.00188],
         log_scale: [-7.58423, -4.58216, -4.25363],
@@ -140,21 +125,16 @@ fn an_unbundled_sog_is_read_from_the_files_beside_its_meta_json() {
 }
 
 #[test]
-fn of_a_streamed_sog_the_finest_level_that_is_there_is_read() {
+fn the_finest_level_that_exists_of_a_streamed_sog_is_read() {
     let Some(scene) = load("playcanvas/playbot/lod-meta.json") else { return };
     let Some(alone) = load("playcanvas/playbot/5_0/meta.json") else { return };
     assert_eq!(scene.len(), 3000, "level 5: the folders of levels 0 to 4 are not there");
-    assert_eq!(at_rest(&scene), at_rest(&alone), "the Gaussians of its only file");
+    assert_eq!(trained(&scene), trained(&alone), "the Gaussians of its only file");
 }
 
 #[test]
 fn a_streamed_sog_without_any_level_is_refused_with_the_missing_files() {
-    let Some(folder) = data() else { return };
-    let from = folder.join("formats/playcanvas/playbot/lod-meta.json");
-    if !from.exists() {
-        skip(format!("{} is not there", from.display()));
-        return;
-    }
+    let Some(from) = fixture("playcanvas/playbot/lod-meta.json") else { return };
     let alone = tempfile::tempdir().expect("a temporary folder");
     let path = alone.path().join("lod-meta.json");
     std::fs::copy(from, &path).expect("the file is copied");

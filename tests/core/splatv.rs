@@ -1,13 +1,14 @@
-//! Captures of splaTV that people have.
+//! Captures of splaTV.
 //!
-//! In: the two captures in the folder that `GS4D_DATA` names. Out: proof that each splat is one Gaussian at a time, though its path is in pieces.
+//! In: the two captures in the folder that `GS4D_DATA` names. Out: proof that each splat is at most one Gaussian at any
+//! time, although its path is split into pieces.
 
 use crate::support::data::data;
 use crate::support::skip::skip;
 use bevy_gs4d::codec::{ReadOptions, load};
 
 #[test]
-fn pieces_of_paths_are_more_gaussians_but_not_more_at_any_time() {
+fn pieces_of_paths_do_not_raise_the_number_of_gaussians_at_any_time() {
     let Some(folder) = data() else { return };
     for (name, splats, pieces) in [("coffeeshort2", 6_871, 15_000..60_000), ("spinach_4", 62_442, 400_000..1_200_000)] {
         let path = folder.join(format!("splatv/{name}.splatv"));

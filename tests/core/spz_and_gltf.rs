@@ -1,23 +1,12 @@
 //! SPZ and glTF files of other makes.
 //!
-//! In: the files in `formats/` of the folder that `GS4D_DATA` names. Out: the values that an independent decoder finds in them.
+//! In: the files in `formats/` of the folder that `GS4D_DATA` names. Out: proof that each file has the values that an
+//! independent decoder finds.
 
-use crate::support::data::data;
-use crate::support::skip::skip;
+use crate::support::other_makes::{assert_near, fixture, opacity};
 use bevy_gs4d::codec::{self, CodecError, ReadOptions};
 use bevy_gs4d::gaussian::{Harmonics, Parameters};
 use bevy_gs4d::scene::{GaussianScene, SceneForm, Trained, UpAxis};
-use std::path::PathBuf;
-
-/// Returns a file of other makes; without it, reports the skipped test and returns `None`.
-fn fixture(name: &str) -> Option<PathBuf> {
-    let path = data()?.join("formats").join(name);
-    if path.exists() {
-        return Some(path);
-    }
-    skip(format!("GS4D_DATA has no formats/{name}"));
-    None
-}
 
 fn load(name: &str) -> Option<Result<GaussianScene, CodecError>> {
     Some(codec::load(&fixture(name)?, &ReadOptions::default()))
@@ -33,20 +22,11 @@ fn trained(name: &str) -> Option<(Parameters, Harmonics)> {
     }
 }
 
-fn assert_near<const N: usize>(what: &str, found: [f32; N], expected: [f32; N], tolerance: f32) {
-    let is_near = found.iter().zip(expected).all(|(a, b)| (a - b).abs() <= tolerance);
-    assert!(is_near, "{what}: {found:?}, not {expected:?}");
-}
-
 /// Returns a rotation of length 1 whose largest component is positive.
 fn unit(rotation: [f32; 4]) -> [f32; 4] {
     let length = rotation.iter().map(|c| c * c).sum::<f32>().sqrt();
     let largest = rotation.into_iter().max_by(|a, b| a.abs().total_cmp(&b.abs())).expect("four components");
     rotation.map(|component| component / length * largest.signum())
-}
-
-fn opacity(logit: f32) -> f32 {
-    1.0 / (1.0 + (-logit).exp())
 }
 
 #[test]

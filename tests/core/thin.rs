@@ -1,10 +1,11 @@
 //! Thin splats: the CPU reference against the same formulas in double precision.
 //!
-//! In: slivers and needles. Out: proof that the projection, the determinant and the falloff lose no more to rounding than a picture shows.
+//! In: slivers and needles. Out: proof that the projection, the determinant and the falloff lose no more to rounding
+//! than a picture shows.
 
 use crate::support::thin::{huge_scene, thin_scene, views};
-use bevy_gs4d::internal::gaussian::alpha::{ALPHA_MAX, ALPHA_MIN, TRANSMITTANCE_MIN};
-use bevy_gs4d::internal::gaussian::conic::LOW_PASS;
+use bevy_gs4d::internal::gaussian::LOW_PASS;
+use bevy_gs4d::internal::gaussian::{ALPHA_MAX, ALPHA_MIN, TRANSMITTANCE_MIN};
 use bevy_gs4d::reference::render;
 use bevy_gs4d::scene::RuntimeScene;
 use bevy_gs4d::view::{Background, TILE_SIZE, View};

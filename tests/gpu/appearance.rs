@@ -1,8 +1,8 @@
-//! Captures with a changed appearance: light, opacity and crop, linear blending, orthographic cameras, multisampled surfaces, debug views,
-//! anti-aliasing.
+//! Captures with a changed appearance: light, opacity and crop, linear blending, orthographic cameras, multisampled
+//! surfaces, debug views, anti-aliasing.
 //!
-//! In: synthetic scenes, the same for GPU and CPU. Out: proof that both draw the same picture, or that a pixel has the expected
-//! value. Skipped where there is no GPU.
+//! In: synthetic scenes, the same for GPU and CPU. Out: proof that both draw the same picture, or that a pixel has the
+//! expected value. Skipped where there is no GPU.
 
 use crate::support::blob::blob;
 use crate::support::gpu;
@@ -128,7 +128,8 @@ fn a_cropped_scene_is_the_scene_of_the_gaussians_inside() {
 #[test]
 fn linear_blending_averages_light() {
     let Some(mut headless) = gpu::headless() else { return };
-    // A wide Gaussian of opacity one half: the middle pixel is the mean of its color and the background, in linear light.
+    // A wide Gaussian of opacity one half: the middle pixel is the mean of its color and the background, in linear
+    // light.
     let scene = blobs(&[(Vec3::ZERO, 4.0, 0.5)]);
     let [frame, _] = both(&mut headless, &scene, view(), Appearance::default(), BlendSpace::Linear);
     let middle = frame.picture.pixels[(SIZE.y / 2 * SIZE.x + SIZE.x / 2) as usize];

@@ -1,20 +1,20 @@
 //! Bakes with training to a size that the first package exceeds.
 //!
-//! In: a small synthetic scene, its own pictures as a dataset. Out: proof that a bake that is interrupted in its second attempt resumes
-//! there, and ends at the same bytes. Skipped where there is no GPU.
+//! In: a small synthetic scene, its own pictures as a dataset. Out: proof that a bake that is interrupted in its second
+//! attempt resumes there, and ends at the same bytes. Skipped where there is no GPU.
 
 use crate::support::capture::Capture;
 use crate::support::gpu;
-use bevy_gs4d::offline::KeyFrames;
-use bevy_gs4d::offline::Progress;
-use bevy_gs4d::offline::SplitOptions;
 use bevy_gs4d::offline::bake::{BakeSettings, Baked, bake};
+use bevy_gs4d::offline::compress::Quality;
+use bevy_gs4d::offline::dataset::SplitOptions;
 use bevy_gs4d::offline::engine::Engine;
-use bevy_gs4d::offline::fine_tune::FineTuneSettings;
-use bevy_gs4d::offline::quantize::Quality;
+use bevy_gs4d::offline::filter::KeyFrames;
+use bevy_gs4d::offline::prune::{Goal, ScoreChoice};
 use bevy_gs4d::offline::score::ScoringSettings;
 use bevy_gs4d::offline::score::Variant;
-use bevy_gs4d::offline::{Goal, ScoreChoice};
+use bevy_gs4d::offline::train::FineTuneSettings;
+use bevy_gs4d::offline::work::Progress;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{FilterKind, GaussianScene};
 use glam::{UVec2, Vec3};
@@ -31,7 +31,8 @@ fn scene() -> GaussianScene {
 }
 
 impl Capture {
-    /// Bakes [`scene`] to 15 kB. The scene has few colors and compresses well until its colors are trained: the first package is too large.
+    /// Bakes [`scene`] to 15 kB. The scene has few colors and compresses well until its colors are trained: the first
+    /// package is too large.
     fn bake(&self, out: &Path, engine: &mut Engine, progress: &mut Listener) -> Result<Baked, String> {
         let settings = BakeSettings {
             checkpoint: self.scene.clone(),
@@ -55,7 +56,8 @@ impl Capture {
     }
 }
 
-/// Keeps the notes of a bake. If `ends`, interrupts the bake after the first training state that is stored after a package was too large.
+/// Keeps the notes of a bake. If `ends`, interrupts the bake after the first training state that is stored after a
+/// package was too large.
 #[derive(Default)]
 struct Listener {
     ends: bool,

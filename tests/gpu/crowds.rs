@@ -1,7 +1,8 @@
-//! Many splats in one tile: more than fit into workgroup memory, into the first buffers of a view, and into the loops of a software driver.
+//! Many splats in one tile: more than fit into workgroup memory, into the first buffers of a view, and into the loops
+//! of a software driver.
 //!
-//! In: scenes of up to 150,000 tiny splats in one tile. Out: proof that both designs match the CPU reference, from the first frame of a view
-//! on. Skipped where there is no GPU.
+//! In: scenes of up to 150,000 tiny splats in one tile. Out: proof that both designs match the CPU reference, from the
+//! first frame of a view on. Skipped where there is no GPU.
 
 use crate::render::{draw_frame, read_color};
 use crate::support::blob::blob;
@@ -27,8 +28,8 @@ fn noise() -> impl FnMut() -> f32 {
     }
 }
 
-/// Returns a scene of `hidden` Gaussians behind the camera and `count` tiny faint Gaussians in the middle tile of [`view`]. Each covers one or
-/// two pixels, so that no pixel becomes opaque before the end of the list.
+/// Returns a scene of `hidden` Gaussians behind the camera and `count` tiny faint Gaussians in the middle tile of
+/// [`view`]. Each covers one or two pixels, so that no pixel becomes opaque before the end of the list.
 fn crowd(count: usize, hidden: usize) -> RuntimeScene {
     let mut random = noise();
     let behind = (0..hidden).map(|_| blob(Vec3::new(0.0, -10.0, 0.0), Vec3::splat(1e-4), 0.5));
@@ -50,7 +51,8 @@ fn view(right: f32) -> View {
     Camera::look_at(eye, eye + Vec3::Y, Vec3::Z, 0.8, SIZE).view(0.0, RasterFov::Reference)
 }
 
-/// Checks colors, one pixel in two hundred excepted: GPU and CPU round differently, and in few pixels the alpha of a splat is close to 1/255.
+/// Checks colors, one pixel in two hundred excepted: GPU and CPU round differently, and in few pixels the alpha of a
+/// splat is close to 1/255.
 fn assert_close(found: impl Iterator<Item = Vec3>, expected: &Frame, what: &str) {
     let apart: Vec<f32> =
         found.zip(&expected.picture.pixels).map(|(found, expected)| (found - *expected).abs().max_element()).collect();

@@ -1,9 +1,10 @@
 //! Views without colors, as for shadow maps.
 //!
-//! In: a synthetic scene, drawn with colors and without. Out: proof that depths and transmittance do not depend on colors, and that tile
-//! bins leave the colors out. Skipped where there is no GPU.
+//! In: a synthetic scene, drawn with colors and without. Out: proof that depths and transmittance do not depend on
+//! colors, and that tile bins leave the colors out. Skipped where there is no GPU.
 
 use crate::support::gpu::{self, CHECKS};
+use crate::support::texture_bytes::texture_bytes;
 use bevy_gs4d::renderer::{Design, GpuCapture, GpuContext, Instance, Renderer, ViewParameters, ViewRenderer};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::view::{Appearance, Background, Camera, RasterFov, View};
@@ -11,28 +12,6 @@ use glam::{UVec2, Vec3};
 
 /// Rows of this width need no padding in any format.
 const SIZE: UVec2 = UVec2::new(128, 96);
-
-/// Returns the bytes of a texture.
-fn read(context: &GpuContext, view: &wgpu::TextureView) -> Vec<u8> {
-    let texture = view.texture();
-    let texel = texture.format().block_copy_size(None).expect("a color format");
-    let (size, row) = (texture.size(), texture.width() * texel);
-    assert_eq!(row % wgpu::COPY_BYTES_PER_ROW_ALIGNMENT, 0, "rows need no padding");
-    let buffer = context.device.create_buffer(&wgpu::BufferDescriptor {
-        label: None,
-        size: u64::from(row) * u64::from(size.height),
-        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    });
-    let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row), rows_per_image: None };
-    let mut encoder = context.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    let to = wgpu::TexelCopyBufferInfo { buffer: &buffer, layout };
-    encoder.copy_texture_to_buffer(texture.as_image_copy(), to, size);
-    context.queue.submit([encoder.finish()]);
-    buffer.slice(..).map_async(wgpu::MapMode::Read, |mapped| mapped.expect("the copy can be mapped"));
-    context.device.poll(wgpu::PollType::wait_indefinitely()).expect("the device finishes");
-    buffer.slice(..).get_mapped_range().to_vec()
-}
 
 /// Draws a frame, and returns the colors with transmittance, and the depths.
 fn draw(context: &GpuContext, renderer: &Renderer, mut view: ViewRenderer, one: Instance<'_>) -> [Vec<f32>; 2] {
@@ -43,7 +22,7 @@ fn draw(context: &GpuContext, renderer: &Renderer, mut view: ViewRenderer, one: 
     view.record(renderer, &mut encoder, &[one]);
     queue.submit([encoder.finish()]);
     let targets = [view.color(), view.depth()].map(|target| target.expect("a frame was prepared"));
-    targets.map(|target| read(context, target).chunks_exact(4).map(bytemuck::pod_read_unaligned).collect())
+    targets.map(|target| texture_bytes(context, target).chunks_exact(4).map(bytemuck::pod_read_unaligned).collect())
 }
 
 #[test]

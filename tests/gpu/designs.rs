@@ -1,7 +1,7 @@
 //! Changes of the design of a view.
 //!
-//! In: a synthetic scene, a view whose design changes between frames. Out: proof that a design does not interpret the counters or the buffers
-//! of the other design. Skipped where there is no GPU.
+//! In: a synthetic scene, a view whose design changes between frames. Out: proof that a design does not interpret the
+//! counters or the buffers of the other design. Skipped where there is no GPU.
 
 use crate::render::draw_frame;
 use crate::support::gpu;

@@ -1,13 +1,13 @@
 //! Levels of detail, measured on the GPU.
 //!
-//! In: a synthetic scene. Out: proof that a level has the promised PSNR in views in which it was neither trained nor measured, and that levels
-//! below the wanted PSNR are dropped. Skipped where there is no GPU.
+//! In: a synthetic scene. Out: proof that a level has the promised PSNR in views in which it was neither trained nor
+//! measured, and that levels below the wanted PSNR are dropped. Skipped where there is no GPU.
 
 use crate::support::gpu;
 use bevy_gs4d::gaussian::{Gaussian, Harmonics};
 use bevy_gs4d::internal::scene::pixels_across;
-use bevy_gs4d::offline::detail::{DetailSettings, detail};
-use bevy_gs4d::offline::{NoProgress, OfflineError};
+use bevy_gs4d::offline::detail::{DetailError, DetailSettings, detail};
+use bevy_gs4d::offline::work::NoProgress;
 use bevy_gs4d::renderer::Headless;
 use bevy_gs4d::scene::{Bounds, Environment, Form, GaussianScene, RuntimeScene, SceneForm};
 use bevy_gs4d::view::{Background, Camera, Frame, RasterFov, View};
@@ -16,8 +16,8 @@ use glam::{UVec2, Vec3};
 /// Settings that take seconds on a software driver.
 const QUICK: DetailSettings = DetailSettings { levels: 1, min_psnr: 45.0, steps: 0, directions: 4, times: 2 };
 
-/// Returns a scene of clumps of faint Gaussians. The clumps are far smaller than their distances, so that each can be merged into one
-/// Gaussian.
+/// Returns a scene of clumps of faint Gaussians. The clumps are far smaller than their distances, so that each can be
+/// merged into one Gaussian.
 fn clumps() -> GaussianScene {
     let (mut gaussians, mut values) = (Vec::new(), Vec::new());
     for clump in 0..20u32 {
@@ -52,7 +52,8 @@ fn view(scene: &RuntimeScene, direction: Vec3, time: f32, pixels: f32) -> View {
     Camera::look_at(eye, bounds.center(), Vec3::Z, fov, UVec2::splat(side as u32)).view(time, RasterFov::Corrected)
 }
 
-/// Returns the PSNR between two frames as parts of a screen of 1280x720 pixels: the lower value of black and white background.
+/// Returns the PSNR between two frames as parts of a screen of 1280x720 pixels: the lower value of black and white
+/// background.
 fn screen_psnr(a: &Frame, b: &Frame) -> f64 {
     let over = |frame: &Frame, at: usize, behind: f32| {
         (frame.picture.pixels[at] + frame.transmittance[at] * behind).clamp(Vec3::ZERO, Vec3::ONE)
@@ -119,8 +120,8 @@ fn scenes_with_environment_map_or_without_gaussians_have_no_levels() {
     let environment = Some(Environment { width: 1, height: 1, texels: vec![0.5; 3] });
     let around = GaussianScene { environment, ..clumps() };
     let refused = detail(&mut headless, around, &QUICK, &mut NoProgress);
-    assert!(matches!(refused, Err(OfflineError::Surrounded)), "a scene with an environment map is refused");
+    assert!(matches!(refused, Err(DetailError::Surrounded)), "a scene with an environment map is refused");
     let nothing = RuntimeScene::sliced(Vec::new(), Harmonics::default());
     let refused = detail(&mut headless, nothing.into(), &QUICK, &mut NoProgress);
-    assert!(matches!(refused, Err(OfflineError::NothingDrawn)), "a scene without Gaussians is refused");
+    assert!(matches!(refused, Err(DetailError::NothingDrawn)), "a scene without Gaussians is refused");
 }

@@ -1,21 +1,24 @@
 //! The passes of training against the gradients of the original and against their CPU references.
 //!
-//! In: the golden scenes with their gradients; synthetic scenes. Out: proof that gradients, loss and optimizer are right, and that training
-//! lowers the loss. Skipped where there is no GPU.
+//! In: the golden scenes with their gradients; synthetic scenes. Out: proof that gradients, loss and optimizer are
+//! right, and that training lowers the loss. Skipped where there is no GPU.
 
+use crate::support::trained::{trained, trained_mut};
+use crate::support::training::{add_terms, round};
 use crate::support::{golden, gpu};
 use bevy_gs4d::gaussian::{GradientMode, Harmonics, Parameters, SliceSettings};
 use bevy_gs4d::internal::gaussian::ParameterGradient;
-use bevy_gs4d::internal::offline::fine_tune::{
-    Exposure, GpuImage, IDENTITY, Moments, NEIGHBORS, STEPS_IN_FLIGHT, Sample, Trainer, adam, center,
-    environment_backward, exposed, exposure_backward, loss, neighbors, opacity_mask, pull, regularization,
+use bevy_gs4d::internal::offline::train::{
+    Exposure, GpuImage, IDENTITY, Moments, NEIGHBORS, Request, STEPS_IN_FLIGHT, Sample, Step, Trainer, center, exposed,
+    exposure_backward, opacity_mask, pull, regularization,
 };
+use bevy_gs4d::internal::offline::train::{adam, environment_backward, loss, neighbors};
 use bevy_gs4d::internal::reference::{PixelGradients, gradients};
-use bevy_gs4d::internal::scene::packed::encode::Bits;
+use bevy_gs4d::internal::scene::Bits;
+use bevy_gs4d::offline::compress::{CompressSettings, compress};
 use bevy_gs4d::offline::dataset::CoveredImage;
-use bevy_gs4d::offline::fine_tune::{Rates, Terms};
-use bevy_gs4d::offline::metrics::SquaredError;
-use bevy_gs4d::offline::quantize::{CompressSettings, compress};
+use bevy_gs4d::offline::measure::SquaredError;
+use bevy_gs4d::offline::train::{FineTuneSettings, Rates, Terms};
 use bevy_gs4d::renderer::Headless;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{Environment, GaussianScene, SceneForm, Trained};
@@ -39,17 +42,13 @@ fn tensors(parameters: &Parameters, harmonics: &Harmonics) -> Vec<(&'static str,
     ]
 }
 
-/// Returns the norm of the difference relative to the norm of the expected values, or the norm of the difference if these are zero.
+/// Returns the norm of the difference relative to the norm of the expected values, or the norm of the difference if
+/// these are zero.
 fn relative_error(found: &[f32], expected: &[f32]) -> f64 {
     let norm = |values: &mut dyn Iterator<Item = f64>| values.map(|v| v * v).sum::<f64>().sqrt();
     let error = norm(&mut found.iter().zip(expected).map(|(a, b)| f64::from(*a) - f64::from(*b)));
     let size = norm(&mut expected.iter().map(|v| f64::from(*v)));
     if size > 0.0 { error / size } else { error }
-}
-
-fn trained(scene: &GaussianScene) -> &Trained {
-    let SceneForm::Trained(trained) = &scene.form else { panic!("the trained form") };
-    trained
 }
 
 #[test]
@@ -91,7 +90,8 @@ fn gradients_match_the_original() {
                 let error = relative_error(found, expected);
                 println!("{:28} {name:7} {tensor:14} {error:.1e}", golden.name);
                 assert_eq!(found.len(), expected.len(), "{}: {tensor}", golden.name);
-                // Sums over an environment map lose more digits; so do sums over the times of static captures, which nearly cancel.
+                // Sums over an environment map lose more digits; so do sums over the times of static captures, which
+                // nearly cancel.
                 let limit = match (tensor, golden.scene.environment.is_some()) {
                     (_, true) => 5e-4,
                     (&"mean_t", false) => 1e-3,
@@ -147,7 +147,7 @@ fn the_gradient_of_the_environment_map_matches_the_cpu_reference() {
 }
 
 #[test]
-fn exposures_are_trained_as_the_cpu_reference_says() {
+fn exposures_are_trained_as_in_the_cpu_reference() {
     let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new(&mut headless);
     let map = Environment { width: 4, height: 2, texels: (0..24).map(|i| i as f32 / 24.0).collect() };
@@ -159,7 +159,9 @@ fn exposures_are_trained_as_the_cpu_reference_says() {
         let mut trainer =
             Trainer::new(&mut headless, scene.clone(), GradientMode::Exact).expect("the scene can be trained");
         // Views 0 and 2 are of one camera, view 1 of another.
-        trainer.set_exposure(&[0, 1, 0]).expect("the shader compiles");
+        let settings = FineTuneSettings { exposure: true, ..FineTuneSettings::default() };
+        let request = Request { cameras: &[0, 1, 0], ..Request::of(&settings) };
+        trainer.prepare(&request).expect("the shader compiles");
         let mut state = trainer.state().expect("the state can be read");
         let place = state.buffers.len() - 3;
         state.buffers[place] = bytemuck::cast_slice(&exposures).to_vec();
@@ -251,7 +253,7 @@ impl Lesson {
     /// Returns the scene with every parameter moved a little.
     fn disturbed(&self) -> GaussianScene {
         let mut scene = self.scene.clone();
-        let SceneForm::Trained(Trained { parameters, harmonics }) = &mut scene.form else { panic!("the trained form") };
+        let Trained { parameters, harmonics } = trained_mut(&mut scene);
         let attributes = [
             parameters.mean.as_flattened_mut(),
             parameters.log_scale.as_flattened_mut(),
@@ -270,7 +272,7 @@ impl Lesson {
     /// Returns the scene with Gaussians that all move, each with another velocity than its neighbors.
     fn moving(&self) -> GaussianScene {
         let mut scene = self.disturbed();
-        let SceneForm::Trained(Trained { parameters, .. }) = &mut scene.form else { panic!("the trained form") };
+        let parameters = &mut trained_mut(&mut scene).parameters;
         for (i, rotation) in parameters.rotation_r.iter_mut().enumerate() {
             rotation[1] += 0.1 + 0.05 * ((i * 37 % 64) as f32 / 32.0 - 1.0);
         }
@@ -306,7 +308,7 @@ fn gradients_through_the_filter_of_mip_splatting_match_the_cpu_reference() {
     let Some(mut headless) = gpu::headless() else { return };
     let Lesson { mut scene, views, .. } = Lesson::new(&mut headless);
     scene.trained_with.mip_filter = true;
-    let SceneForm::Trained(Trained { parameters, .. }) = &mut scene.form else { panic!("the trained form") };
+    let parameters = &mut trained_mut(&mut scene).parameters;
     // Splats of about a pixel, of which the filter changes the opacity most.
     parameters.log_scale.as_flattened_mut().iter_mut().for_each(|scale| *scale -= 1.0);
     let runtime = scene.clone().into_runtime().expect("the scene can be drawn");
@@ -352,7 +354,7 @@ fn the_loss_and_its_gradient_match_the_cpu_reference() {
     for weight in [0.0, 0.3] {
         let scene = lesson.disturbed();
         let mut trainer = Trainer::new(&mut headless, scene, GradientMode::Exact).expect("the scene can be trained");
-        trainer.set_terms(Terms { mask: weight, ..Terms::default() }).expect("the weight is right");
+        add_terms(&mut trainer, Terms { mask: weight, ..Terms::default() }).expect("the weight is right");
         let images = [trainer.upload(&image).expect("the image fits the GPU")];
         let sample = lesson.sample(&images, 0);
         trainer.accumulate(&[sample], 0.2).expect("the view is drawn");
@@ -482,7 +484,7 @@ fn the_gradients_of_terms_match_the_cpu_reference() {
         let terms = terms(weights);
         let mut trainer =
             Trainer::new(&mut headless, scene.clone(), GradientMode::Exact).expect("the scene can be trained");
-        trainer.set_terms(terms).expect("the weights are right");
+        add_terms(&mut trainer, terms).expect("the weights are right");
         trainer.accumulate_terms(0).expect("the terms are added");
         let found = trainer.gradients().expect("gradients can be read");
         let expected = regularization(parameters, &near, &terms, 1.0).expect("the Gaussians can be drawn").gradients;
@@ -508,7 +510,7 @@ fn fifty_steps_lower_each_term() {
         let mut trainer =
             Trainer::new(&mut headless, lesson.moving(), GradientMode::Exact).expect("the scene can be trained");
         let terms = terms(weights);
-        trainer.set_terms(terms).expect("the weights are right");
+        add_terms(&mut trainer, terms).expect("the weights are right");
         let value = |trainer: &Trainer<'_>| {
             let scene = trainer.scene().expect("the scene can be read");
             let parameters = &trained(&scene).parameters;
@@ -534,7 +536,7 @@ fn the_mask_term_removes_splats_outside_the_images() {
     let mut left_after = |weight: f64| {
         let mut trainer =
             Trainer::new(&mut headless, lesson.scene.clone(), GradientMode::Exact).expect("the scene can be trained");
-        trainer.set_terms(Terms { mask: weight, ..Terms::default() }).expect("the weight is right");
+        add_terms(&mut trainer, Terms { mask: weight, ..Terms::default() }).expect("the weight is right");
         // The images are pictures of the scene itself: only the mask term has a gradient.
         let draw = |trainer: &mut Trainer<'_>, view: &View| trainer.draw(view, black).expect("the view is drawn");
         let images: Vec<CoveredImage> = lesson.views.iter().map(|view| covered(&draw(&mut trainer, view), 0)).collect();
@@ -567,7 +569,7 @@ fn neighbors_are_part_of_the_state() {
     let mut train = |pause: Option<usize>| {
         let mut trainer =
             Trainer::new(&mut headless, lesson.moving(), GradientMode::Exact).expect("the scene can be trained");
-        trainer.set_terms(terms).expect("the weight is right");
+        add_terms(&mut trainer, terms).expect("the weight is right");
         let rates = Rates { mean: 2e-3, ..Rates::OURS };
         let images = lesson.upload(&trainer);
         for step in 0..20 {
@@ -576,7 +578,7 @@ fn neighbors_are_part_of_the_state() {
                 assert_eq!(state.neighbors.len(), 400 * NEIGHBORS * 4, "the state has the neighbors of each Gaussian");
                 trainer = Trainer::new(&mut headless, lesson.moving(), GradientMode::Exact)
                     .expect("the scene can be trained");
-                trainer.set_terms(terms).expect("the weight is right");
+                add_terms(&mut trainer, terms).expect("the weight is right");
                 assert!(trainer.resume(&state), "a state of the same number of Gaussians is accepted");
                 assert!(trainer.state().expect("the state can be read") == state, "the state read back is unchanged");
                 let mut wrong = state.clone();
@@ -592,8 +594,8 @@ fn neighbors_are_part_of_the_state() {
     assert!(train(None) == train(Some(11)), "the resumed run ends at the same bits");
 }
 
-/// So few bits of geometry that every picture changes. Means have more bits: packing changes the order of Gaussians at exactly the same
-/// depth.
+/// So few bits of geometry that every picture changes. Means have more bits: packing changes the order of Gaussians at
+/// exactly the same depth.
 const COARSE: Bits =
     Bits { mean: 14, mean_t: 10, velocity: 6, sigma_t: 6, scale: 4, rotation: 4, opacity: 6, base: 8, escape: 0.02 };
 
@@ -624,7 +626,7 @@ fn rounded_geometry_is_drawn_as_in_the_packed_form() {
     ];
     for (model, change) in models {
         let mut scene = lesson.disturbed();
-        let SceneForm::Trained(Trained { parameters, .. }) = &mut scene.form else { panic!("the trained form") };
+        let parameters = &mut trained_mut(&mut scene).parameters;
         change(parameters);
         let expected = packed_pictures(&mut headless, scene.clone(), &lesson.views);
         let mut trainer =
@@ -639,7 +641,7 @@ fn rounded_geometry_is_drawn_as_in_the_packed_form() {
         };
         let before = far(&mut trainer);
         assert!(before.iter().sum::<usize>() > 400, "{model}: so few bits change more than 400 pixels: {before:?}");
-        trainer.round(&COARSE).expect("geometry can be packed");
+        round(&mut trainer, COARSE, usize::MAX).expect("geometry can be packed");
         let after = far(&mut trainer);
         // Where float rounding decides whether a splat counts, a pixel may differ by more.
         assert!(after.iter().all(|&count| count <= 20), "{model}: at most 20 pixels of each picture differ: {after:?}");
@@ -662,14 +664,15 @@ fn training_on_rounded_geometry_raises_the_psnr_of_the_packed_scene() {
             Trainer::new(&mut headless, lesson.scene.clone(), GradientMode::Exact).expect("the scene can be trained");
         let rates = Rates { color: 1e-2, harmonics: 2.5e-3, ..Rates::OURS };
         let images = lesson.upload(&trainer);
+        if rounding {
+            round(&mut trainer, COARSE, 10).expect("geometry can be packed");
+        }
         for step in 0..steps {
-            if rounding && step % 10 == 0 {
-                trainer.round(&COARSE).expect("geometry can be packed");
-            }
+            let factor = 1.0 - 0.95 * step as f64 / steps as f64;
+            trainer.begin_step(&Step::new(rates, factor, step + 1)).expect("geometry can be packed");
             trainer
                 .accumulate(&[lesson.sample(&images, step % 6), lesson.sample(&images, (step + 3) % 6)], 0.2)
                 .expect("the views are drawn");
-            let factor = 1.0 - 0.95 * step as f64 / steps as f64;
             trainer.step(&rates, factor, step + 1).expect("the step succeeds");
         }
         assert_eq!(trainer.faults().expect("faults can be read"), None, "every gradient is finite");
@@ -693,19 +696,18 @@ fn the_roundings_of_geometry_are_part_of_the_state() {
         let mut trainer =
             Trainer::new(&mut headless, lesson.disturbed(), GradientMode::Exact).expect("the scene can be trained");
         let images = lesson.upload(&trainer);
+        round(&mut trainer, COARSE, 8).expect("geometry can be packed");
         for step in 0..20 {
             if pause == Some(step) {
                 let state = trainer.state().expect("the state can be read");
                 trainer = Trainer::new(&mut headless, lesson.disturbed(), GradientMode::Exact)
                     .expect("the scene can be trained");
                 assert!(!trainer.resume(&state), "a state with roundings is refused before geometry is rounded");
-                trainer.round(&COARSE).expect("geometry can be packed");
+                round(&mut trainer, COARSE, 8).expect("geometry can be packed");
                 assert!(trainer.resume(&state), "a state of the same number of Gaussians is accepted");
                 assert!(trainer.state().expect("the state can be read") == state, "the state read back is unchanged");
             }
-            if step % 8 == 0 {
-                trainer.round(&COARSE).expect("geometry can be packed");
-            }
+            trainer.begin_step(&Step::new(Rates::OURS, 1.0, step + 1)).expect("geometry can be packed");
             trainer.accumulate(&[lesson.sample(&images, step % 6)], 0.2).expect("the view is drawn");
             trainer.step(&Rates::OURS, 1.0, step + 1).expect("the step succeeds");
         }
@@ -721,7 +723,7 @@ fn a_weight_that_is_not_a_number_is_refused() {
     let mut trainer =
         Trainer::new(&mut headless, lesson.scene.clone(), GradientMode::Exact).expect("the scene can be trained");
     for (name, weights) in [("motion", [f64::NAN, 0.0, 0.0]), ("rigid", [0.0, -1.0, 0.0])] {
-        let refused = trainer.set_terms(terms(weights)).expect_err("the weight is refused").to_string();
+        let refused = add_terms(&mut trainer, terms(weights)).expect_err("the weight is refused").to_string();
         assert!(refused.contains(name), "{name} is named: {refused}");
     }
 }
@@ -831,12 +833,12 @@ fn gradients_that_are_not_finite_are_left_out_and_reported() {
     assert_ne!(scene, lesson.scene, "the other Gaussians are trained");
 }
 
-/// Returns a scene and a view whose camera is at the mean of a Gaussian, while the Gaussian has moved away: the direction of its color is 0
-/// / 0.
+/// Returns a scene and a view whose camera is at the mean of a Gaussian, while the Gaussian has moved away: the
+/// direction of its color is 0 / 0.
 fn without_direction(lesson: &Lesson) -> (GaussianScene, View) {
     let (mut scene, time) = (lesson.moving(), 0.5);
     let change = |scene: &mut GaussianScene, mean: Vec3| {
-        let SceneForm::Trained(Trained { parameters, .. }) = &mut scene.form else { panic!("the trained form") };
+        let parameters = &mut trained_mut(scene).parameters;
         parameters.mean[7] = mean.to_array();
         parameters.mean_t[7] = time - 0.8;
         (parameters.log_scale[7], parameters.log_scale_t[7]) = ([0.1f32.ln(); 3], 2f32.ln());

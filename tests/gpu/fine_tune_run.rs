@@ -1,23 +1,25 @@
 //! Complete runs of fine-tuning: with a temporal filter, compressed, interrupted and resumed.
 //!
-//! In: a small synthetic scene, its own pictures as a dataset. Out: proof that Gaussians which a filter leaves out are not trained, that
-//! the filter is computed again, that the PSNR of a compressed result is that of the package, and that a resumed run has the result of an
-//! uninterrupted one. Skipped where there is no GPU.
+//! In: a small synthetic scene, its own pictures as a dataset. Out: proof that Gaussians which a filter leaves out are
+//! not trained, that the filter is computed again, that the PSNR of a compressed result is that of the package, and
+//! that a resumed run has the result of an uninterrupted one. Skipped where there is no GPU.
 
+use crate::support::interrupting::Interrupting;
+use crate::support::trained::trained_mut;
 use crate::support::{dataset, gpu};
 use bevy_gs4d::gaussian::{GradientMode, Parameters};
-use bevy_gs4d::internal::offline::fine_tune::{Sample, Trainer};
 use bevy_gs4d::internal::offline::prune::select;
 use bevy_gs4d::internal::offline::store::{Key, Store};
+use bevy_gs4d::internal::offline::train::{Sample, Trainer};
+use bevy_gs4d::offline::compress::Quality;
 use bevy_gs4d::offline::dataset::TrainingView;
-use bevy_gs4d::offline::fine_tune::{FineTuneSettings, ImageRoom, Rates, Resume, TrainingImages, fine_tune};
-use bevy_gs4d::offline::metrics::SquaredError;
-use bevy_gs4d::offline::quantize::Quality;
-use bevy_gs4d::offline::{NoProgress, OfflineError, Progress};
-use bevy_gs4d::offline::{SplitOptions, Splits};
+use bevy_gs4d::offline::dataset::{SplitOptions, Splits};
+use bevy_gs4d::offline::measure::SquaredError;
+use bevy_gs4d::offline::train::{FineTuneSettings, ImageRoom, Rates, Resume, TrainError, TrainingImages, fine_tune};
+use bevy_gs4d::offline::work::{NoProgress, Progress};
 use bevy_gs4d::renderer::Headless;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
-use bevy_gs4d::scene::{Environment, FilterKind, GaussianScene, SceneForm, TemporalFilter, Trained};
+use bevy_gs4d::scene::{Environment, FilterKind, GaussianScene, TemporalFilter};
 use bevy_gs4d::view::Background;
 use glam::{UVec2, Vec3};
 use tempfile::TempDir;
@@ -57,7 +59,7 @@ impl Lesson {
     /// Returns the scene with darker colors and a filter.
     fn disturbed(&self, filter: Option<TemporalFilter>) -> GaussianScene {
         let mut scene = GaussianScene { filter, ..self.scene.clone() };
-        trained(&mut scene).harmonics.values.iter_mut().for_each(|value| *value *= 0.7);
+        trained_mut(&mut scene).harmonics.values.iter_mut().for_each(|value| *value *= 0.7);
         scene
     }
 
@@ -66,12 +68,8 @@ impl Lesson {
     }
 }
 
-fn trained(scene: &mut GaussianScene) -> &mut Trained {
-    let SceneForm::Trained(trained) = &mut scene.form else { panic!("the trained form") };
-    trained
-}
-
-/// Returns a filter of two segments: Gaussians of even index in the first, Gaussians whose index is a multiple of three in the second.
+/// Returns a filter of two segments: Gaussians of even index in the first, Gaussians whose index is a multiple of three
+/// in the second.
 fn filter(kind: FilterKind) -> TemporalFilter {
     let mut bits = vec![0; 2 * TemporalFilter::words(COUNT)];
     for index in 0..COUNT {
@@ -105,16 +103,20 @@ fn gaussians_that_a_filter_leaves_out_are_not_trained() {
         let mut alone = gradients(select(&lesson.disturbed(None), &kept), view);
         let mut active = select(&found, &kept);
         assert_eq!(
-            trained(&mut active).parameters,
-            trained(&mut alone).parameters,
-            "geometry as without inactive ones"
+            trained_mut(&mut active).parameters,
+            trained_mut(&mut alone).parameters,
+            "geometry equals that without the inactive Gaussians"
         );
-        assert_eq!(trained(&mut active).harmonics, trained(&mut alone).harmonics, "color as without inactive ones");
+        assert_eq!(
+            trained_mut(&mut active).harmonics,
+            trained_mut(&mut alone).harmonics,
+            "color equals that without the inactive Gaussians"
+        );
         assert!(
-            trained(&mut alone).harmonics.values.iter().any(|&value| value != 0.0),
+            trained_mut(&mut alone).harmonics.values.iter().any(|&value| value != 0.0),
             "active Gaussians have gradients"
         );
-        let parameters = &trained(&mut found).parameters;
+        let parameters = &trained_mut(&mut found).parameters;
         let still = (0..COUNT)
             .filter(|index| index % divisor as usize != 0)
             .all(|index| parameters.mean[index] == [0.0; 3] && parameters.opacity_logit[index] == 0.0);
@@ -150,36 +152,6 @@ fn filters_by_views_are_computed_again_in_training_and_support_filters_after_it(
         filter(FilterKind::Support),
         "support is computed from trained lifespans"
     );
-}
-
-/// Interrupts a task at one of its steps.
-struct Interrupting {
-    task: &'static str,
-    left: usize,
-    /// The tasks that have begun and not finished.
-    running: Vec<&'static str>,
-}
-
-impl Progress for Interrupting {
-    fn begin(&mut self, task: &'static str, _: usize) {
-        self.running.push(task);
-    }
-
-    fn advance(&mut self) {
-        if self.running.last() == Some(&self.task) {
-            self.left = self.left.saturating_sub(1);
-        }
-    }
-
-    fn finish(&mut self) {
-        self.running.pop();
-    }
-
-    fn note(&mut self, _: &str) {}
-
-    fn is_interrupted(&self) -> bool {
-        self.left == 0
-    }
 }
 
 #[test]
@@ -248,9 +220,9 @@ fn an_interrupted_and_resumed_run_has_the_result_of_an_uninterrupted_one() {
     for (task, left) in [("fine-tuning", 3), ("fine-tuning", 4), ("training codebooks", 2), ("training codebooks", 53)]
     {
         let store = lesson.store(&format!("{task} {left}"));
-        let stopped = run(&mut headless, &store, &mut Interrupting { task, left, running: Vec::new() });
+        let stopped = run(&mut headless, &store, &mut Interrupting::new(task, left));
         let stopped = match stopped.map_err(|error| *error) {
-            Err(OfflineError::Interrupted { tuned: Some(stopped) }) => stopped,
+            Err(TrainError::Interrupted { tuned: Some(stopped) }) => stopped,
             other => panic!("{task}: an interrupted run is an error with the best result so far: {other:?}"),
         };
         let made = whole.curve.iter().take(stopped.curve.len());
@@ -304,7 +276,7 @@ fn captures_of_every_model_and_with_an_environment_map_are_trained() {
     ];
     for (name, change, environment) in cases {
         let mut scene = synthesize(&SynthSettings { count: COUNT, ..SynthSettings::default() });
-        change(&mut trained(&mut scene).parameters);
+        change(&mut trained_mut(&mut scene).parameters);
         scene.environment = environment;
         let lesson = Lesson::of(scene);
         let settings = FineTuneSettings { steps: 20, evaluate_every: 20, ..FineTuneSettings::default() };
@@ -340,7 +312,7 @@ fn images_that_are_read_when_they_are_needed_train_the_same_scene() {
     assert_eq!(all, lesson.views.len(), "there is memory for all images");
     // An image has 6,400 bytes.
     let (few, found) = train(ImageRoom { first: 1, all: 3 * 6_400 });
-    assert!((1..=4).contains(&few), "a moment, and as many as have room: {few}");
+    assert!((1..=4).contains(&few), "the images of the first moment, and as many as fit: {few}");
     assert!(found.scene == expected.scene, "the same Gaussians, bit for bit");
     assert_eq!(found.curve, expected.curve, "the same losses, and the same PSNR of validation");
 }

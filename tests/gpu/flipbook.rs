@@ -1,14 +1,15 @@
 //! The memory of sequences on the GPU.
 //!
-//! In: a sequence of exported frames, packed. Out: proof that the memory of the device beside the records of the sequence is that of its largest
-//! frame. Skipped where there is no GPU, or where the driver does not report its memory.
+//! In: a sequence of exported frames, packed. Out: proof that the memory of the device beside the records of the
+//! sequence is that of its largest frame. Skipped where there is no GPU, or where the driver does not report its
+//! memory.
 
 use crate::support::gpu;
 use crate::support::packed_scene::{BLACK, settings};
 use crate::support::skip::skip;
-use bevy_gs4d::internal::codec::export::{Export, Exporter};
+use bevy_gs4d::internal::codec::{Export, Exporter};
 use bevy_gs4d::internal::codec::{read_bytes, read_frames};
-use bevy_gs4d::offline::quantize::compress;
+use bevy_gs4d::offline::compress::compress;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{GaussianScene, RuntimeScene};
 use bevy_gs4d::view::{Camera, RasterFov};

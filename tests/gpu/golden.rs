@@ -1,13 +1,13 @@
 //! The renderer against the original implementation, on all golden views.
 //!
-//! In: the scenes of `tests/golden/`. Out: proof that the GPU's pictures match the pictures of the original, with
-//! both designs of the renderer. Skipped where there is no GPU.
+//! In: the scenes of `tests/golden/`. Out: proof that the GPU's pictures match the pictures of the original, with both
+//! designs of the renderer. Skipped where there is no GPU.
 
 use crate::support::{golden, gpu};
 use bevy_gs4d::renderer::Design;
 
-/// On a software driver the largest differences are 1e-6 of color, 4e-6 of depth and 1e-6 of alpha, as on the CPU; and 4e-4 of color
-/// over an environment map, whose texel depends on the driver's inverse trigonometric functions.
+/// On a software driver the largest differences are 1e-6 of color, 4e-6 of depth and 1e-6 of alpha, as on the CPU; and
+/// 4e-4 of color over an environment map, whose texel depends on the driver's inverse trigonometric functions.
 #[test]
 fn gpu_matches_the_original() {
     let Some(mut headless) = gpu::headless() else { return };

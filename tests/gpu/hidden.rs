@@ -1,16 +1,16 @@
 //! Work that is saved behind opaque surfaces.
 //!
-//! In: a list of `blend_blocks` in which splats behind a surface precede splats in front of it, as no sorted list has them; depth textures for
-//! `find_surfaces`; scenes behind walls. Out: proof that a pixel visits no batch after the first whose last splat is hidden: it does not show the
-//! later splats; the farthest surface of each tile; that splats behind a wall are left out before they are sorted, and no others. Skipped where
-//! there is no GPU.
+//! In: a list of `blend_blocks` in which splats behind a surface precede splats in front of it, as no sorted list has
+//! them; depth textures for `find_surfaces`; scenes behind walls. Out: proof that a pixel visits no batch after the
+//! first whose last splat is hidden: it does not show the later splats; the farthest surface of each tile; that splats
+//! behind a wall are left out before they are sorted, and no others. Skipped where there is no GPU.
 
 use crate::support::composed::compose;
 use crate::support::gpu;
 use crate::support::surfaces::{depth_texture, edge};
-use bevy_gs4d::internal::renderer::layout::{BIN_COUNTERS, FrameUniforms, SplatShape, VisibleSplat};
-use bevy_gs4d::internal::renderer::shaders::MULTISAMPLED;
-use bevy_gs4d::internal::renderer::tile_bins::{Blending, EIGHT_AT_ONCE, LARGE_BATCHES};
+use bevy_gs4d::internal::renderer::MULTISAMPLED;
+use bevy_gs4d::internal::renderer::{BIN_COUNTERS, FrameUniforms, SplatShape, VisibleSplat};
+use bevy_gs4d::internal::renderer::{Blending, EIGHT_AT_ONCE, LARGE_BATCHES};
 use bevy_gs4d::renderer::{Design, GpuContext, Instance, OpaqueDepth, ViewParameters};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::view::{Appearance, Background, Camera, RasterFov};
@@ -44,7 +44,8 @@ fn pipeline(device: &wgpu::Device, pass: &str, definitions: &[&str]) -> wgpu::Co
     })
 }
 
-/// Returns the depth of the farthest surface of each tile and of the picture, by `find_surfaces`. `size` is that of the picture, its tiles, and the samples of the surface.
+/// Returns the depth of the farthest surface of each tile and of the picture, by `find_surfaces`. `size` is that of the
+/// picture, its tiles, and the samples of the surface.
 fn find_surfaces(
     context: &GpuContext,
     definitions: &[&str],
@@ -101,7 +102,8 @@ fn find_surfaces(
     (of_tiles.iter().copied().map(depth).collect(), depth(counters[2]))
 }
 
-/// Blends a list whose first batch is behind the surface and whose other splats are in front of it. Returns the red of each pixel.
+/// Blends a list whose first batch is behind the surface and whose other splats are in front of it. Returns the red of
+/// each pixel.
 fn blend(context: &GpuContext, definitions: &[&str], surface: &wgpu::TextureView, samples: u32) -> Vec<f32> {
     let GpuContext { device, queue, .. } = context;
     let pipeline = pipeline(device, "blend_blocks", definitions);

@@ -1,21 +1,22 @@
 //! Structures and constants that both the shaders and the host define.
 //!
-//! In: the composed passes with naga's layout. Out: proof that every structure and constant is the same in the shaders and on the host.
+//! In: the composed passes with naga's layout. Out: proof that every structure and constant is the same in the shaders
+//! and on the host.
 
 use crate::support::composed::{compose, pass_names};
 use bevy_gs4d::gaussian::Gaussian;
-use bevy_gs4d::internal::gaussian::alpha::{ALPHA_MAX, ALPHA_MIN, TRANSMITTANCE_MIN};
-use bevy_gs4d::internal::gaussian::conic::{LOW_PASS, MAX_VARIANCE, THIN};
-use bevy_gs4d::internal::offline::fine_tune::NEIGHBORS;
-use bevy_gs4d::internal::offline::layout::{
+use bevy_gs4d::internal::gaussian::{ALPHA_MAX, ALPHA_MIN, TRANSMITTANCE_MIN};
+use bevy_gs4d::internal::gaussian::{LOW_PASS, MAX_VARIANCE, THIN};
+use bevy_gs4d::internal::offline::engine::{
     AdamUniforms, DropoutUniforms, ExposureUniforms, FIRST_SEEN, LossUniforms, NoiseUniforms, RelocationUniforms,
-    RoundingRecord, TermWeights, TiedColors, TrainedRecord, TrainedScene,
+    RoundingRecord, TiedColors, TrainedRecord, TrainedScene,
 };
-use bevy_gs4d::internal::renderer::layout::{
+use bevy_gs4d::internal::offline::train::{NEIGHBORS, TermWeights};
+use bevy_gs4d::internal::renderer::COPIED_INSTANCE;
+use bevy_gs4d::internal::renderer::{
     self, Activation, BLOCK, Counters, DIGITS, FrameUniforms, INSTANCE_STRIDE, INSTANCES_AT_ONCE, InstanceUniforms,
     MotionUniforms, SortStep, SplatRecord, SplatShape, VisibleSplat,
 };
-use bevy_gs4d::internal::renderer::shaders::COPIED_INSTANCE;
 use bevy_gs4d::view::TILE_SIZE;
 use std::collections::{BTreeMap, BTreeSet};
 use std::mem::offset_of;
@@ -292,26 +293,26 @@ fn constants_of_the_libraries_match_the_host() {
     let lines = sources.iter().flat_map(|source| source.lines()).filter(|line| !line.starts_with('#'));
     let libraries = parse_str(&lines.collect::<Vec<_>>().join("\n")).expect("the libraries are WGSL");
     let integers = [
-        ("LIGHTING_AS_TRAINED", layout::LIGHTING_AS_TRAINED),
-        ("LIGHTING_ENCODED", layout::LIGHTING_ENCODED),
-        ("LIGHTING_LINEAR", layout::LIGHTING_LINEAR),
-        ("DEBUG_COLOR", layout::DEBUG_COLOR),
-        ("DEBUG_DEPTH", layout::DEBUG_DEPTH),
-        ("DEBUG_OVERDRAW", layout::DEBUG_OVERDRAW),
-        ("DEBUG_ACTIVE", layout::DEBUG_ACTIVE),
-        ("DEBUG_LIFESPAN", layout::DEBUG_LIFESPAN),
-        ("DEBUG_VELOCITY", layout::DEBUG_VELOCITY),
-        ("FILTER_BITS", layout::FILTER_BITS),
-        ("FILTER_INTERVALS", layout::FILTER_INTERVALS),
-        ("INVISIBLE", layout::INVISIBLE),
-        ("BACKGROUND_NONE", layout::BACKGROUND_NONE),
-        ("BACKGROUND_COLOR", layout::BACKGROUND_COLOR),
-        ("BACKGROUND_ENVIRONMENT", layout::BACKGROUND_ENVIRONMENT),
-        ("SORT_SLOTS", layout::SORT_SLOTS),
-        ("SORT_VISIBLE", layout::SORT_VISIBLE),
-        ("SORT_PAIRS", layout::SORT_PAIRS),
+        ("LIGHTING_AS_TRAINED", renderer::LIGHTING_AS_TRAINED),
+        ("LIGHTING_ENCODED", renderer::LIGHTING_ENCODED),
+        ("LIGHTING_LINEAR", renderer::LIGHTING_LINEAR),
+        ("DEBUG_COLOR", renderer::DEBUG_COLOR),
+        ("DEBUG_DEPTH", renderer::DEBUG_DEPTH),
+        ("DEBUG_OVERDRAW", renderer::DEBUG_OVERDRAW),
+        ("DEBUG_ACTIVE", renderer::DEBUG_ACTIVE),
+        ("DEBUG_LIFESPAN", renderer::DEBUG_LIFESPAN),
+        ("DEBUG_VELOCITY", renderer::DEBUG_VELOCITY),
+        ("FILTER_BITS", renderer::FILTER_BITS),
+        ("FILTER_INTERVALS", renderer::FILTER_INTERVALS),
+        ("INVISIBLE", renderer::INVISIBLE),
+        ("BACKGROUND_NONE", renderer::BACKGROUND_NONE),
+        ("BACKGROUND_COLOR", renderer::BACKGROUND_COLOR),
+        ("BACKGROUND_ENVIRONMENT", renderer::BACKGROUND_ENVIRONMENT),
+        ("SORT_SLOTS", renderer::SORT_SLOTS),
+        ("SORT_VISIBLE", renderer::SORT_VISIBLE),
+        ("SORT_PAIRS", renderer::SORT_PAIRS),
         ("TILE_SIZE", TILE_SIZE),
-        ("BIN_COUNTERS", layout::BIN_COUNTERS),
+        ("BIN_COUNTERS", renderer::BIN_COUNTERS),
     ];
     let floats = [
         ("LOW_PASS", LOW_PASS),

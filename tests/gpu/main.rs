@@ -1,7 +1,8 @@
 //! Tests of the renderer without Bevy, and of individual shaders.
 //!
-//! In: scenes and buffers made by the tests, `tests/golden/`, the files of `shaders/`. Out: one test binary. The header of each
-//! module describes its tests. Tests that need a device are skipped if there is neither a GPU nor a software driver.
+//! In: scenes and buffers made by the tests, `tests/golden/`, the files of `shaders/`. Out: one test binary. The header
+//! of each module describes its tests. Tests that need a device are skipped if there is neither a GPU nor a software
+//! driver.
 
 mod appearance;
 mod bake;
@@ -39,6 +40,7 @@ mod support {
     pub mod depth_texture;
     pub mod golden;
     pub mod gpu;
+    pub mod interrupting;
     pub mod limited_device;
     pub mod no_gpu;
     #[cfg(target_os = "linux")]
@@ -48,5 +50,8 @@ mod support {
     pub mod random;
     pub mod skip;
     pub mod surfaces;
+    pub mod texture_bytes;
     pub mod thin;
+    pub mod trained;
+    pub mod training;
 }

@@ -1,13 +1,13 @@
 //! The memory of a process that draws many pictures.
 //!
-//! In: synthetic scenes, drawn at many times. Out: proof that a software driver, whose compiled shaders are in the memory of the process,
-//! compiles no shader after the first pictures. Skipped on hardware.
+//! In: synthetic scenes, drawn at many times. Out: proof that a software driver, whose compiled shaders are in the
+//! memory of the process, compiles no shader after the first pictures. Skipped on hardware.
 
 use crate::support::gpu;
 use crate::support::own_process::run_alone;
 use crate::support::packed_scene::{BLACK, scene, settings, view};
 use crate::support::skip::skip;
-use bevy_gs4d::offline::quantize::compress;
+use bevy_gs4d::offline::compress::compress;
 use bevy_gs4d::renderer::{Design, Headless};
 use bevy_gs4d::scene::RuntimeScene;
 use std::fs;
@@ -28,7 +28,8 @@ fn compiled() -> u64 {
     code.sum()
 }
 
-/// Draws a scene at times of the first half of [0, 1], then of the second half. Returns the compiled bytes after each half.
+/// Draws a scene at times of the first half of [0, 1], then of the second half. Returns the compiled bytes after each
+/// half.
 fn compiled_in_turn(headless: &mut Headless, scene: &RuntimeScene) -> [u64; 2] {
     let capture = headless.upload(scene).expect("the scene fits the GPU");
     [0.0, 0.5].map(|first| {

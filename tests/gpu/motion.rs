@@ -1,13 +1,13 @@
 //! Motions on the GPU.
 //!
-//! In: moving scenes, seen from two places at two times. Out: proof that the GPU's motions match the CPU reference and the pinhole model, and
-//! that motions do not change colors. Skipped where there is no GPU.
+//! In: moving scenes, seen from two places at two times. Out: proof that the GPU's motions match the CPU reference and
+//! the pinhole model, and that motions do not change colors. Skipped where there is no GPU.
 
 use crate::support::gpu;
 use crate::support::packed_scene::{scene, settings};
 use bevy_gs4d::gaussian::{Gaussian, Harmonics};
 use bevy_gs4d::internal::reference::{self, TileLists};
-use bevy_gs4d::offline::quantize::compress;
+use bevy_gs4d::offline::compress::compress;
 use bevy_gs4d::reference::Layer;
 use bevy_gs4d::renderer::{ColorPrecision, Design, Instance, ViewParameters};
 use bevy_gs4d::scene::RuntimeScene;

@@ -1,10 +1,11 @@
 //! The packed form on the GPU.
 //!
-//! In: packed synthetic scenes. Out: proof that the GPU decodes them like the CPU reference. Skipped where there is no GPU.
+//! In: packed synthetic scenes. Out: proof that the GPU decodes them like the CPU reference. Skipped where there is no
+//! GPU.
 
 use crate::support::gpu;
 use crate::support::packed_scene::{BLACK, scene, settings, view};
-use bevy_gs4d::offline::quantize::compress;
+use bevy_gs4d::offline::compress::compress;
 use bevy_gs4d::reference;
 use bevy_gs4d::renderer::GpuError;
 use bevy_gs4d::scene::{CodedColors, Form, PackedColors, PackedScene};

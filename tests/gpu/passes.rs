@@ -1,14 +1,15 @@
 //! Individual passes against their CPU references.
 //!
-//! In: input buffers made by the tests, output buffers filled with an arbitrary value. Out: proof that the GPU writes the results of the
-//! functions of [`reference`]. `blend`, which needs textures, is compared as part of whole frames. Skipped where there is no GPU.
+//! In: input buffers made by the tests, output buffers filled with an arbitrary value. Out: proof that the GPU writes
+//! the results of the functions of [`reference`]. `blend`, which needs textures, is compared as part of whole frames.
+//! Skipped where there is no GPU.
 
 use crate::support::passes::{Gpu, Pass};
 use bevy_gs4d::gaussian::Gaussian;
-use bevy_gs4d::internal::gaussian::conic::conic_entries;
-use bevy_gs4d::internal::gaussian::overlap::TileRect;
+use bevy_gs4d::internal::gaussian::TileRect;
+use bevy_gs4d::internal::gaussian::conic_entries;
 use bevy_gs4d::internal::reference::{self, Pair, Splat};
-use bevy_gs4d::internal::renderer::layout::{
+use bevy_gs4d::internal::renderer::{
     self, BLOCK, Counters, DEPTH_STEPS, DIGIT_BITS, DIGITS, FrameUniforms, INVISIBLE, InstanceUniforms, SortStep,
     SplatRecord,
 };
@@ -90,7 +91,7 @@ impl<'a> Sort<'a> {
         ];
         self.pass.dispatch("count", blocks, &buffers);
         self.pass.dispatch("scan", DIGITS, &buffers);
-        if source == layout::SORT_SLOTS {
+        if source == renderer::SORT_SLOTS {
             self.pass.dispatch("visible", 1, &buffers);
         }
         self.pass.dispatch("scatter", blocks, &buffers);
@@ -107,7 +108,7 @@ impl<'a> Sort<'a> {
 fn check_sort_by_depth(gpu: &Gpu, pass: &Pass<'_>, keys: &[u32], what: impl Display) {
     let counters = Counters { visible: RUBBISH, ..Counters::default() };
     let mut sort = Sort::new(gpu, pass, keys, &vec![RUBBISH; keys.len()], counters);
-    sort.step(0, layout::SORT_SLOTS, (keys.len() as u32).div_ceil(BLOCK));
+    sort.step(0, renderer::SORT_SLOTS, (keys.len() as u32).div_ceil(BLOCK));
     let mut expected: Vec<u32> = (0..keys.len() as u32).filter(|&slot| keys[slot as usize] != INVISIBLE).collect();
     reference::sort(&mut expected, |&slot| keys[slot as usize]);
 
@@ -117,7 +118,7 @@ fn check_sort_by_depth(gpu: &Gpu, pass: &Pass<'_>, keys: &[u32], what: impl Disp
     let blocks = visible.div_ceil(BLOCK);
     assert_eq!(arguments, [blocks, 1, 1, RUBBISH, RUBBISH, RUBBISH], "{what}: the dispatch size of the later steps");
     for step in 1..DEPTH_STEPS {
-        sort.step(step * DIGIT_BITS, layout::SORT_VISIBLE, blocks);
+        sort.step(step * DIGIT_BITS, renderer::SORT_VISIBLE, blocks);
     }
     let [sorted, order] = sort.pairs().map(|list| list[..visible as usize].to_vec());
     assert_same(&order, &expected, format_args!("{what}: the order"));
@@ -176,7 +177,7 @@ fn sort_by_tile_is_stable_and_changes_only_the_pairs() {
         let mut sort = Sort::new(&gpu, &pass, &keys, &values, counters);
         // 300 tiles need nine bits.
         for step in 0..3 {
-            sort.step(step * DIGIT_BITS, layout::SORT_PAIRS, (count as u32).div_ceil(BLOCK));
+            sort.step(step * DIGIT_BITS, renderer::SORT_PAIRS, (count as u32).div_ceil(BLOCK));
         }
         reference::sort(&mut pairs, |pair| pair.tile);
         let [found, expected] = [sort.pairs(), lists(&pairs)];
@@ -212,8 +213,8 @@ fn random_order(count: usize) -> Vec<u32> {
     order
 }
 
-/// Runs `bin` with a capacity of `capacity` pairs, and compares. `expected` are at least the pairs that fit; `wanted` is the number of all
-/// pairs.
+/// Runs `bin` with a capacity of `capacity` pairs, and compares. `expected` are at least the pairs that fit; `wanted`
+/// is the number of all pairs.
 fn check_bin(gpu: &Gpu, splats: &[Splat], order: &[u32], grid: UVec2, capacity: u32, expected: &[Pair], wanted: u32) {
     let what = format!("{} splats, capacity {capacity} of {wanted} pairs", order.len());
     let pass = gpu.pass("bin");

@@ -1,22 +1,22 @@
 //! Whole frames on the GPU: properties that hold for any scene, camera and device.
 //!
-//! In: synthetic scenes. Out: proof that frames match the CPU reference, independent of the division of the scene into captures and parts,
-//! of the number of pairs and of opaque surfaces. Skipped where there is no GPU.
+//! In: synthetic scenes. Out: proof that frames match the CPU reference, independent of the division of the scene into
+//! captures and parts, of the number of pairs and of opaque surfaces. Skipped where there is no GPU.
 
 use crate::support::surfaces::depth_texture;
+use crate::support::texture_bytes::texture_bytes;
+use crate::support::trained::trained_mut;
 use crate::support::{gpu, limited_device, packed_scene};
 use bevy_gs4d::gaussian::{Gaussian, MARGINAL_CUTOFF, Parameters, SMALLEST_CUTOFF};
 use bevy_gs4d::internal::reference::{self, Splat};
-use bevy_gs4d::offline::quantize::compress;
+use bevy_gs4d::offline::compress::compress;
 use bevy_gs4d::reference::Layer;
 use bevy_gs4d::renderer::{
     ActiveList, CaptureUpload, Design, GpuCapture, GpuContext, GpuError, Headless, Instance, OpaqueDepth, Renderer,
     ShaderChecks, ViewParameters, ViewRenderer,
 };
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
-use bevy_gs4d::scene::{
-    ActiveSets, Environment, FilterKind, GaussianScene, RuntimeScene, SceneForm, Sliced, TemporalFilter,
-};
+use bevy_gs4d::scene::{ActiveSets, Environment, FilterKind, GaussianScene, RuntimeScene, Sliced, TemporalFilter};
 use bevy_gs4d::view::{Appearance, Background, BlendSpace, Camera, Counts, Frame, RasterFov, View};
 use glam::{Mat4, Quat, UVec2, Vec3};
 use std::ops::Range;
@@ -113,9 +113,9 @@ fn assert_finite(frame: &Frame, what: &str) {
     assert!(numbers && frame.picture.pixels.iter().all(|pixel| pixel.is_finite()), "{what}: all values are finite");
 }
 
-/// Checks that frames agree within 1e-3 (depths 5e-3), except for one pixel in two hundred, which agree within fifty times as much. GPU and
-/// CPU round differently: in a few pixels the alpha of a splat is close to 1/255, a splat covers one tile more, or two splats at the same
-/// depth are exchanged.
+/// Checks that frames agree within 1e-3 (depths 5e-3), except for one pixel in two hundred, which agree within fifty
+/// times as much. GPU and CPU round differently: in a few pixels the alpha of a splat is close to 1/255, a splat covers
+/// one tile more, or two splats at the same depth are exchanged.
 fn assert_close(found: &Frame, expected: &Frame, what: &str) {
     assert_eq!(found.picture.size, expected.picture.size, "{what}: the sizes are equal");
     assert_finite(found, what);
@@ -573,7 +573,8 @@ fn a_picture_that_grows_step_by_step_needs_few_new_buffers() {
         // Growing, then shrinking.
         for step in (0..40).chain((0..40).rev()) {
             let view = look_from(EYE, UVec2::new(90 + 2 * step, 70 + step), 0.5);
-            // As in a resized window, each frame has another depth texture, which needs a bind group. The texture contains no surfaces.
+            // As in a resized window, each frame has another depth texture, which needs a bind group. The texture
+            // contains no surfaces.
             let surfaces = depth_texture(headless.context(), view.size, 0.0);
             let distance = [0.1, 0.0, 0.0, 1.0];
             let opaque = OpaqueDepth { texture: &surfaces, samples: 1, origin: UVec2::ZERO, distance };
@@ -592,26 +593,7 @@ fn a_picture_that_grows_step_by_step_needs_few_new_buffers() {
 
 /// Reads red, green and blue of every pixel of a texture whose rows need no padding.
 pub fn read_color(context: &GpuContext, view: &ViewRenderer) -> Vec<[f32; 3]> {
-    let texture = view.color().expect("a frame was prepared").texture();
-    let (size, row) = (texture.size(), texture.width() * 16);
-    assert_eq!(row % wgpu::COPY_BYTES_PER_ROW_ALIGNMENT, 0, "rows need no padding");
-    let buffer = context.device.create_buffer(&wgpu::BufferDescriptor {
-        label: None,
-        size: u64::from(row) * u64::from(size.height),
-        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    });
-    let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row), rows_per_image: None };
-    let mut encoder = context.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    encoder.copy_texture_to_buffer(
-        texture.as_image_copy(),
-        wgpu::TexelCopyBufferInfo { buffer: &buffer, layout },
-        size,
-    );
-    context.queue.submit([encoder.finish()]);
-    buffer.slice(..).map_async(wgpu::MapMode::Read, |mapped| mapped.expect("the copy can be mapped"));
-    context.device.poll(wgpu::PollType::wait_indefinitely()).expect("the device finishes");
-    let bytes = buffer.slice(..).get_mapped_range().to_vec();
+    let bytes = texture_bytes(context, view.color().expect("a frame was prepared"));
     bytes.chunks_exact(16).map(|pixel| bytemuck::pod_read_unaligned(&pixel[..12])).collect()
 }
 
@@ -662,8 +644,7 @@ fn invalid_gaussians_are_refused_before_upload() {
     ];
     for (reason, poison) in poisons {
         let mut scene = trained(20);
-        let SceneForm::Trained(trained) = &mut scene.form else { panic!("synthetic scenes are in the trained form") };
-        poison(&mut trained.parameters);
+        poison(&mut trained_mut(&mut scene).parameters);
         let error = scene.into_runtime().expect_err(reason);
         assert!(
             error.index == 7 && error.reason.contains(reason),
@@ -693,8 +674,7 @@ fn invalid_gaussians_are_refused_before_upload() {
 /// Returns a scene in which every tenth Gaussian has this scale along the first `axes` axes.
 fn extreme(scale: f32, axes: usize) -> RuntimeScene {
     let mut scene = trained(500);
-    let SceneForm::Trained(trained) = &mut scene.form else { panic!("synthetic scenes are in the trained form") };
-    for log_scale in trained.parameters.log_scale.iter_mut().step_by(10) {
+    for log_scale in trained_mut(&mut scene).parameters.log_scale.iter_mut().step_by(10) {
         log_scale[..axes].fill(scale.ln());
     }
     scene.into_runtime().expect("the scales are finite")

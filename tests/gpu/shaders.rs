@@ -1,15 +1,13 @@
 //! Validation of every shader, without a device.
 //!
-//! In: the files of `shaders/`. Out: proof that each file is known to the renderer and is valid WGSL, and that only the variants for devices
-//! with optional capabilities need these capabilities.
+//! In: the files of `shaders/`. Out: proof that each file is known to the renderer and is valid WGSL, and that only the
+//! variants for devices with optional capabilities need these capabilities.
 
 use crate::support::composed::{compose, pass_names};
-use bevy_gs4d::internal::offline::shaders::{COMPAT, COMPAT_WITHOUT_TIME, MIP_FILTER};
-use bevy_gs4d::internal::renderer::global_sort::AtOnce;
-use bevy_gs4d::internal::renderer::shaders::{BINNED, COPIED_INSTANCE, MULTISAMPLED, SHADERS, SUBGROUPS_OF_32};
-use bevy_gs4d::internal::renderer::tile_bins::{
-    Blending, COUNTED, EIGHT_AT_ONCE, FEW_BINS, LARGE_BATCHES, Lists, OPAQUE,
-};
+use bevy_gs4d::internal::offline::engine::{COMPAT, COMPAT_WITHOUT_TIME, MIP_FILTER};
+use bevy_gs4d::internal::renderer::AtOnce;
+use bevy_gs4d::internal::renderer::{BINNED, COPIED_INSTANCE, MULTISAMPLED, SHADERS, SUBGROUPS_OF_32};
+use bevy_gs4d::internal::renderer::{Blending, COUNTED, EIGHT_AT_ONCE, FEW_BINS, LARGE_BATCHES, Lists, OPAQUE};
 use bevy_gs4d::renderer::{ColorPrecision, Storage};
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 use std::collections::BTreeSet;
@@ -92,7 +90,8 @@ fn every_pass_composes_and_is_valid() {
     report(all.filter_map(|(name, definitions)| check(name, definitions).err()).collect());
 }
 
-/// Drivers may round a floating-point expression differently in each place where it is inlined; indices computed from it would differ.
+/// Drivers may round a floating-point expression differently in each place where it is inlined; indices computed from
+/// it would differ.
 #[test]
 fn sort_bins_computes_its_indices_from_integers() {
     for lists in Lists::ALL {
@@ -133,7 +132,7 @@ fn passes_of_pages() -> impl Iterator<Item = (&'static str, Vec<&'static str>)> 
     names.flat_map(|name| Storage::ALL.into_iter().map(move |storage| (name, storage.definitions().to_vec())))
 }
 
-/// WGSL reserves names that other languages do not; naga gives an entry point another name if it has such a one.
+/// WGSL reserves names that other languages do not; naga renames an entry point with a reserved name.
 #[test]
 fn no_entry_point_has_a_reserved_name() {
     for (name, definitions) in pass_names().map(|name| (name, Vec::new())).chain(passes_of_pages()) {

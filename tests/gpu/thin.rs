@@ -1,11 +1,11 @@
 //! Thin and huge Gaussians: both GPU designs against the CPU reference.
 //!
-//! In: slivers and needles, Gaussians near the limits of single precision. Out: proof that one rule decides what is drawn, and that the
-//! pictures are the same. Skipped where there is no GPU.
+//! In: slivers and needles, Gaussians near the limits of single precision. Out: proof that one rule decides what is
+//! drawn, and that the pictures are the same. Skipped where there is no GPU.
 
 use crate::support::gpu;
 use crate::support::thin::{huge_scene, thin_scene, views};
-use bevy_gs4d::offline::metrics::SquaredError;
+use bevy_gs4d::offline::measure::SquaredError;
 use bevy_gs4d::reference::render;
 use bevy_gs4d::renderer::{Design, Headless};
 use bevy_gs4d::scene::RuntimeScene;

@@ -1,7 +1,9 @@
-//! Tile bins against the global sort: scenes that exceed its buffers or its workgroup memory, and many copies of a capture.
+//! Tile bins against the global sort: scenes that exceed its buffers or its workgroup memory, and many copies of a
+//! capture.
 //!
-//! In: scenes of many splats in few tiles, the bundled capture. Out: proof that both designs draw the same picture from the first frame on,
-//! and that copies drawn by one dispatch equal copies drawn by separate dispatches. Skipped where there is no GPU.
+//! In: scenes of many splats in few tiles, the bundled capture. Out: proof that both designs draw the same picture from
+//! the first frame on, and that copies drawn by one dispatch equal copies drawn by separate dispatches. Skipped where
+//! there is no GPU.
 
 use crate::support::blob::blob;
 use crate::support::gpu;
@@ -9,7 +11,7 @@ use crate::support::surfaces::{depth_texture, edge};
 use bevy_gs4d::codec::ReadOptions;
 use bevy_gs4d::codec::load;
 use bevy_gs4d::gaussian::{Gaussian, Harmonics};
-use bevy_gs4d::offline::metrics::SquaredError;
+use bevy_gs4d::offline::measure::SquaredError;
 use bevy_gs4d::renderer::{ColorPrecision, Design, Headless, Instance, OpaqueDepth, ViewParameters};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{Form, RuntimeScene};
@@ -17,7 +19,8 @@ use bevy_gs4d::view::{Appearance, Background, Camera, DebugView, Frame, RasterFo
 use glam::{UVec2, Vec3};
 use std::path::Path;
 
-/// Returns a scene of faint Gaussians near the origin, in layers along the line of sight: `layer` Gaussians have the same depth.
+/// Returns a scene of faint Gaussians near the origin, in layers along the line of sight: `layer` Gaussians have the
+/// same depth.
 fn crowd(count: usize, layer: usize, deviation: f32) -> RuntimeScene {
     let gaussians = (0..count).map(|index| {
         let spread = |step: usize| (index * step % 97) as f32 / 97.0 - 0.5;
@@ -97,7 +100,8 @@ fn overflowing_bins_grow_in_the_next_frame() {
     assert_eq!(again, first, "the first frame of another call has the initial capacity");
 }
 
-/// Returns a scene with a crowd of `shown` Gaussians in the middle, among Gaussians behind the camera. Some of the shown cover the picture.
+/// Returns a scene with a crowd of `shown` Gaussians in the middle, among Gaussians behind the camera. Some of the
+/// shown cover the picture.
 fn crowd_among_many(shown: usize, all: usize) -> RuntimeScene {
     let mut scene = crowd(all, 7, 0.01);
     let Form::Sliced(sliced) = &mut scene.form else { panic!("single precision") };
@@ -112,12 +116,14 @@ fn crowd_among_many(shown: usize, all: usize) -> RuntimeScene {
     scene
 }
 
-/// If room for as many splats as the fullest bin has would be too large for all bins, bins are counted before they are filled.
+/// If room for as many splats as the fullest bin has would be too large for all bins, bins are counted before they are
+/// filled.
 #[test]
 fn bins_with_exact_room_match_the_reference_design() {
     let Some(mut headless) = gpu::headless() else { return };
-    // The first guess of equal rooms is too large for all pictures. In the first, later frames have equal rooms; in the others the fullest bin is
-    // too full for that. A workgroup counts the splats of 529 and of 1920 bins in workgroup memory, but not those of 2176.
+    // The first guess of equal rooms is too large for all pictures. In the first, later frames have equal rooms; in the
+    // others the fullest bin is too full for that. A workgroup counts the splats of 529 and of 1920 bins in workgroup
+    // memory, but not those of 2176.
     for (size, shown, all) in [
         (UVec2::splat(1456), 1_000, 132_000),
         (UVec2::new(4096, 1900), 3_000, 104_000),
@@ -218,7 +224,8 @@ fn every_variant_of_blending_matches_the_reference_design() {
     }
 }
 
-/// A trained capture drawn without depths, as by benchmarks and cameras that need no depth, in small and large pictures.
+/// A trained capture drawn without depths, as by benchmarks and cameras that need no depth, in small and large
+/// pictures.
 #[test]
 fn the_bundled_capture_without_depths_matches_the_reference_design() {
     let Some(mut headless) = gpu::headless() else { return };

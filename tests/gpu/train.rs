@@ -1,32 +1,40 @@
-//! Training from pictures alone: relocation, noise, the schedule of colors, and whole runs on a dataset of a few moving blobs.
+//! Training from pictures alone: relocation, noise, the schedule of colors, and whole runs on a dataset of a few moving
+//! blobs.
 //!
-//! In: scenes and datasets made here. Out: proof that the passes `noise`, `relocate` and `regularize` have the results of their CPU references,
-//! that relocation hardly changes the picture, that the densification of the original is that of its CPU reference, that a capture is trained
-//! from nothing, and that runs repeat and resume at the same bytes.
+//! In: scenes and datasets made here. Out: proof that the passes `noise`, `relocate` and `regularize` have the results
+//! of their CPU references, that relocation hardly changes the picture, that the densification of the original is that
+//! of its CPU reference, that a capture is trained from nothing, and that runs repeat and resume at the same bytes.
 //! Skipped where there is no GPU.
 
 use crate::support::blob::blob;
+use crate::support::interrupting::Interrupting;
+use crate::support::trained::{trained, trained_mut};
+use crate::support::training::{SEED, add_terms, growing, growing_step, still_growth, view};
 use crate::support::{dataset, gpu};
 use bevy_gs4d::gaussian::{Gaussian, GradientMode, Harmonics, Parameters};
-use bevy_gs4d::internal::offline::dataset::clock::Clock;
-use bevy_gs4d::internal::offline::dataset::selection::camera_numbers;
-use bevy_gs4d::internal::offline::fine_tune::{
-    Cloning, CloningStep, FREE, Sample, StepGrowth, Terms, Trainer, TrainerState, densify, is_dropped, is_free, loss,
-    neighbors, noise, regularization, relocate, reset_opacity,
-};
-use bevy_gs4d::internal::offline::layout::TrainedRecord;
+use bevy_gs4d::internal::offline::dataset::Clock;
+use bevy_gs4d::internal::offline::dataset::camera_numbers;
+use bevy_gs4d::internal::offline::engine::TrainedRecord;
 use bevy_gs4d::internal::offline::store::{Key, Store};
 use bevy_gs4d::internal::offline::train::{CaptureSettings, Start, StartSettings, begin, capture_of, train};
+use bevy_gs4d::internal::offline::train::{
+    Cloning, FREE, Sample, Step, Terms, Trainer, TrainerState, densify, dropout_seed, is_dropped, is_free, noise_seed,
+    regularization, relocate, relocation_seed, reset_opacity,
+};
+use bevy_gs4d::internal::offline::train::{loss, neighbors, noise};
 use bevy_gs4d::internal::reference as passes;
 use bevy_gs4d::offline::dataset::TrainingView;
-use bevy_gs4d::offline::fine_tune::{FineTuneSettings, FineTuned, Growth, ImageRoom, Rates, Resume, TrainingImages};
-use bevy_gs4d::offline::metrics::SquaredError;
-use bevy_gs4d::offline::{NoProgress, OfflineError, Progress, SplitOptions, Splits};
+use bevy_gs4d::offline::dataset::{SplitOptions, Splits};
+use bevy_gs4d::offline::measure::SquaredError;
+use bevy_gs4d::offline::train::{
+    FineTuneSettings, FineTuned, Growth, ImageRoom, Rates, Resume, TrainError, TrainingImages,
+};
+use bevy_gs4d::offline::work::{NoProgress, Progress};
 use bevy_gs4d::reference;
 use bevy_gs4d::renderer::Headless;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
-use bevy_gs4d::scene::{GaussianScene, RuntimeScene, SceneForm, Trained};
-use bevy_gs4d::view::{Appearance, Background, BlendSpace, Camera, RasterFov, View};
+use bevy_gs4d::scene::{GaussianScene, RuntimeScene};
+use bevy_gs4d::view::{Appearance, Background, BlendSpace, RasterFov, View};
 use glam::{UVec2, Vec3};
 use std::path::Path;
 use tempfile::TempDir;
@@ -35,23 +43,6 @@ const COUNT: usize = 300;
 
 fn synthetic() -> GaussianScene {
     synthesize(&SynthSettings { count: COUNT, ..SynthSettings::default() })
-}
-
-fn trained(scene: &GaussianScene) -> &Trained {
-    let SceneForm::Trained(trained) = &scene.form else { panic!("the trained form") };
-    trained
-}
-
-fn trained_mut(scene: &mut GaussianScene) -> &mut Trained {
-    let SceneForm::Trained(trained) = &mut scene.form else { panic!("the trained form") };
-    trained
-}
-
-/// Returns a trainer with the passes of training from pictures alone.
-fn growing(headless: &mut Headless, scene: GaussianScene) -> Trainer<'_> {
-    let mut trainer = Trainer::new(headless, scene, GradientMode::Exact).expect("the scene can be trained");
-    trainer.set_growing().expect("the Gaussians are native");
-    trainer
 }
 
 fn records(parameters: &Parameters) -> Vec<TrainedRecord> {
@@ -76,15 +67,16 @@ fn the_pass_noise_matches_the_cpu_reference() {
     let logits = parameters.opacity_logit.iter_mut().enumerate();
     logits.for_each(|(index, logit)| *logit = -8.0 + 10.0 * index as f32 / COUNT as f32);
     let mut expected = records(&trained(&scene).parameters);
-    let (rate, factor, seed) = (Rates::OURS.mean * scene.trained_with.spatial_lr_scale, 0.5, 0xfeed_beef);
+    let (rate, factor, seed) = (Rates::OURS.mean * scene.trained_with.spatial_lr_scale, 0.5, noise_seed(SEED, 0));
     let strength = (5e5 * rate * factor) as f32;
     let least_time_scale = 0.2;
     let least = least_time_scale as f32 * scene.trained_with.time_span();
     (0..).zip(&mut expected).for_each(|(index, record)| noise(record, index, seed, strength, least.ln()));
-    let mut trainer = growing(&mut headless, scene.clone());
+    let growth = Growth { noise: 5e5, least_time_scale, ..still_growth() };
+    let mut trainer = growing(&mut headless, scene.clone(), growth);
     // The gradients are 0: the optimizer moves nothing.
-    let growth = StepGrowth { color_values: 144, noise: 5e5, least_time_scale, seed, adds_up: false };
-    trainer.step_growing(&Rates::OURS, factor, 1, Some(growth)).expect("the step succeeds");
+    let step = Step { factor, ..growing_step(0, Rates::OURS, 144) };
+    trainer.optimize(&step).expect("the step succeeds");
     let found = trainer.scene().expect("the scene can be read");
     let (before, found) = (&trained(&scene).parameters, &trained(&found).parameters);
     let (mut moved, mut raised) = (0, 0);
@@ -113,27 +105,21 @@ fn the_pass_noise_matches_the_cpu_reference() {
 fn dropped_gaussians_are_hidden_until_the_next_step() {
     let Some(mut headless) = gpu::headless() else { return };
     let (scene, view, black) = (synthetic(), view(0, UVec2::new(70, 54)), Background::Color([0.0; 3]));
-    let (share, seed) = (0.3, 0x1234_5678);
+    let (share, seed, step) = (0.3, dropout_seed(SEED, 0), growing_step(0, Rates::OURS, 144));
+    let growth = Growth { dropout: share, ..still_growth() };
     let mut hidden = scene.clone();
     let logits = trained_mut(&mut hidden).parameters.opacity_logit.iter_mut();
     (0..).zip(logits).filter(|(index, _)| is_dropped(*index, seed, share)).for_each(|(_, logit)| *logit = -30.0);
-    let expected = growing(&mut headless, hidden).draw(&view, black).expect("the view is drawn").picture;
-    let mut trainer = growing(&mut headless, scene);
+    let expected = growing(&mut headless, hidden, growth).draw(&view, black).expect("the view is drawn").picture;
+    let mut trainer = growing(&mut headless, scene, growth);
     let whole = trainer.draw(&view, black).expect("the view is drawn").picture;
-    trainer.drop_out(share, seed);
+    trainer.begin_step(&step).expect("the device works");
     let dropped = trainer.draw(&view, black).expect("the view is drawn").picture;
     assert_eq!(dropped, expected, "the picture without the dropped Gaussians");
     assert_ne!(dropped, whole, "the dropped Gaussians were visible");
-    let still = StepGrowth { color_values: 144, noise: 0.0, least_time_scale: 0.0, seed, adds_up: false };
-    trainer.step_growing(&Rates::OURS, 1.0, 1, Some(still)).expect("the step succeeds");
+    trainer.optimize(&step).expect("the step succeeds");
     let after = trainer.draw(&view, black).expect("the view is drawn").picture;
     assert_eq!(after, whole, "every Gaussian is drawn after the step");
-}
-
-fn view(index: usize, size: UVec2) -> View {
-    let angle = index as f32 * 0.7;
-    let eye = Vec3::new(2.4 * angle.cos(), 2.4 * angle.sin(), 1.2);
-    Camera::look_at(eye, Vec3::ZERO, Vec3::Z, 0.8, size).view(index as f32 / 6.0, RasterFov::Reference)
 }
 
 /// Returns the buffers of a state by Gaussian: values, first and second moments of the geometry, then of the color.
@@ -145,7 +131,8 @@ fn rows(state: &TrainerState, buffer: usize) -> Vec<Vec<f32>> {
 /// The buffers of moments.
 const MOMENTS: [usize; 4] = [1, 2, 4, 5];
 
-/// Asserts that all Gaussians have the colors of their sources, new ones moments of zero, and the others their own moments.
+/// Asserts that all Gaussians have the colors of their sources, new ones moments of zero, and the others their own
+/// moments.
 fn assert_copied(before: &TrainerState, after: &TrainerState, source: &[usize], is_new: &[bool]) {
     let (colors, colors_before) = (rows(after, 3), rows(before, 3));
     assert!((0..COUNT).all(|index| colors[index] == colors_before[source[index]]), "colors are those of the sources");
@@ -159,7 +146,7 @@ fn assert_copied(before: &TrainerState, after: &TrainerState, source: &[usize], 
 }
 
 #[test]
-fn relocation_copies_what_the_cpu_reference_says_and_hardly_changes_the_picture() {
+fn relocation_matches_the_cpu_reference_and_hardly_changes_the_picture() {
     let Some(mut headless) = gpu::headless() else { return };
     let mut scene = synthetic();
     let parameters = &mut trained_mut(&mut scene).parameters;
@@ -167,7 +154,8 @@ fn relocation_copies_what_the_cpu_reference_says_and_hardly_changes_the_picture(
     parameters.opacity_logit.iter_mut().step_by(3).for_each(|logit| *logit = -9.0);
     let views: Vec<View> = (0..6).map(|index| view(index, UVec2::new(70, 54))).collect();
     let black = Background::Color([0.0; 3]);
-    let mut trainer = growing(&mut headless, scene);
+    let growth = Growth { relocate_every: Some(1), ..still_growth() };
+    let mut trainer = growing(&mut headless, scene, growth);
     // A step gives every Gaussian that is seen moments.
     let image = {
         let frame = trainer.draw(&views[0], black).expect("the view is drawn");
@@ -184,9 +172,9 @@ fn relocation_copies_what_the_cpu_reference_says_and_hardly_changes_the_picture(
     };
     let drawn = pictures(&mut trainer);
     let mut expected: Vec<TrainedRecord> = bytemuck::pod_collect_to_vec(&before.buffers[0]);
-    let moves = relocate(&mut expected, 17);
+    let moves = relocate(&mut expected, relocation_seed(SEED, 1));
     assert_eq!(moves.len(), COUNT / 3, "the faded third moves");
-    assert_eq!(trainer.relocate(17).expect("the device works"), moves.len(), "as many on the GPU");
+    trainer.end_step(&growing_step(0, Rates::OURS, 144)).expect("the device works");
     let after = trainer.state().expect("the state can be read");
     let found: Vec<TrainedRecord> = bytemuck::pod_collect_to_vec(&after.buffers[0]);
     assert_eq!(found, expected, "the raw parameters are those of the CPU reference");
@@ -211,7 +199,8 @@ fn relocation_copies_what_the_cpu_reference_says_and_hardly_changes_the_picture(
     assert!(error.psnr() > 35.0, "the pictures hardly change: {:.2} dB", error.psnr());
 }
 
-/// Returns the length of the gradient of each splat's center in a view, in normalized device coordinates, and whether it is shown.
+/// Returns the length of the gradient of each splat's center in a view, in normalized device coordinates, and whether
+/// it is shown.
 fn screen_gradients(scene: &RuntimeScene, view: &View, pixels: &[Vec3]) -> Vec<(bool, f64)> {
     let layer = passes::Layer { scene, view: *view, appearance: Appearance::default() };
     let splats = passes::project(&layer, BlendSpace::Encoded);
@@ -241,8 +230,8 @@ fn the_densification_of_the_original_is_that_of_the_cpu_reference() {
     parameters.log_scale.iter_mut().skip(8).step_by(50).flatten().for_each(|scale| *scale += 1.0);
     let (views, black): (Vec<View>, _) =
         ((0..4).map(|i| view(i, UVec2::new(70, 54))).collect(), Background::Color([0.0; 3]));
-    let mut trainer = growing(&mut headless, scene);
-    trainer.set_cloning().expect("the shader compiles");
+    let cloning = Cloning { capacity: COUNT, every: 2, from: 0, until: usize::MAX, reset_every: 7 };
+    let mut trainer = growing(&mut headless, scene, Growth { cloning: Some(cloning), ..still_growth() });
     let texels: Vec<[u8; 4]> = (0..70 * 54).map(|i| [(i * 7 % 200) as u8, 120, (i / 70 * 4) as u8, 255]).collect();
     let image = bevy_gs4d::offline::dataset::CoveredImage { size: views[0].size, texels, has_gaps: false };
     let uploaded = trainer.upload(&image).expect("the image fits the GPU");
@@ -268,10 +257,9 @@ fn the_densification_of_the_original_is_that_of_the_cpu_reference() {
         }
         let sample = |index: usize| Sample { view: &views[index], image: &uploaded, background: black, number: 0 };
         trainer.accumulate(&own.map(sample), 0.2).expect("the views are drawn");
-        let growth = StepGrowth { color_values: 3, noise: 0.0, least_time_scale: 0.0, seed: 0, adds_up: true };
-        trainer.step_growing(&still, 1.0, step + 1, Some(growth)).expect("the step succeeds");
+        trainer.optimize(&growing_step(step, still, 3)).expect("the step succeeds");
     }
-    let found = trainer.screen_gradients(2).expect("they can be read");
+    let found = trainer.screen_gradients().expect("they can be read");
     let mut shown = 0;
     for (index, (&found, [sum, steps])) in found.iter().zip(sums).enumerate() {
         let expected = sum / steps.max(1.0);
@@ -282,16 +270,16 @@ fn the_densification_of_the_original_is_that_of_the_cpu_reference() {
     assert!(shown > 10, "some gradients are large: {shown}");
     let before = trainer.state().expect("the state can be read");
     let mut expected: Vec<TrainedRecord> = bytemuck::pod_collect_to_vec(&before.buffers[0]);
-    let step = CloningStep { batch: 2, removes_large: true, seed: 3 };
-    let densified = densify(&mut expected, &found, 3.0, true, 3);
+    let densified = densify(&mut expected, &found, 3.0, true, relocation_seed(SEED, 8));
     println!("{} cloned, {} split, {} removed", densified.cloned, densified.split, densified.removed);
     assert!(densified.cloned > 2 && densified.split > 5 && densified.removed > 10, "all kinds: {densified:?}");
-    assert_eq!(trainer.densify(&step).expect("the device works"), densified, "the same Gaussians");
+    // After eight steps a densification is due, and no reset.
+    trainer.end_step(&growing_step(7, still, 3)).expect("the device works");
     let after = trainer.state().expect("the state can be read");
     let records: Vec<TrainedRecord> = bytemuck::pod_collect_to_vec(&after.buffers[0]);
     assert_eq!(records, expected, "the raw parameters are those of the CPU reference");
     let taken = expected.iter().filter(|record| !is_free(record)).count();
-    assert_eq!(trainer.taken().expect("it can be read"), taken, "the number of Gaussians");
+    assert_eq!(trainer.live_count().expect("it can be read"), taken, "the number of Gaussians");
     let mut source: Vec<usize> = (0..COUNT).collect();
     let mut is_new = vec![false; COUNT];
     for &[to, from] in &densified.moves {
@@ -299,8 +287,9 @@ fn the_densification_of_the_original_is_that_of_the_cpu_reference() {
         is_new[to as usize] = true;
     }
     assert_copied(&before, &after, &source, &is_new);
-    assert_eq!(trainer.screen_gradients(2).expect("they can be read"), [0.0; COUNT], "sums begin again");
-    trainer.reset_opacity().expect("the device works");
+    assert_eq!(trainer.screen_gradients().expect("they can be read"), [0.0; COUNT], "sums begin again");
+    // After seven, a reset alone.
+    trainer.end_step(&growing_step(6, still, 3)).expect("the device works");
     reset_opacity(&mut expected);
     let reset = trainer.state().expect("the state can be read");
     let records: Vec<TrainedRecord> = bytemuck::pod_collect_to_vec(&reset.buffers[0]);
@@ -322,7 +311,7 @@ fn the_gradient_of_the_term_of_scale_matches_the_cpu_reference() {
     let expected =
         regularization(parameters, &neighbors(&parameters.mean), &terms, 1.0).expect("the Gaussians are drawn");
     let mut trainer = Trainer::new(&mut headless, scene.clone(), GradientMode::Exact).expect("the scene is trained");
-    trainer.set_terms(terms).expect("the weight is right");
+    add_terms(&mut trainer, terms).expect("the weight is right");
     trainer.accumulate_terms(0).expect("the term is added");
     let found = trainer.gradients().expect("gradients can be read");
     let found = &trained(&found).parameters;
@@ -343,14 +332,13 @@ fn color_values_beyond_the_degree_are_not_trained() {
     let size = UVec2::new(70, 54);
     let view = view(0, size);
     for values in [3, 12, 27, 48, 144] {
-        let mut trainer = growing(&mut headless, scene.clone());
+        let mut trainer = growing(&mut headless, scene.clone(), still_growth());
         let texels = vec![[200, 10, 90, 255]; size.element_product() as usize];
         let image = bevy_gs4d::offline::dataset::CoveredImage { size, texels, has_gaps: false };
         let image = trainer.upload(&image).expect("the image fits the GPU");
         let sample = Sample { view: &view, image: &image, background: Background::None, number: 0 };
         trainer.accumulate(&[sample], 0.2).expect("the view is drawn");
-        let growth = StepGrowth { color_values: values, noise: 0.0, least_time_scale: 0.0, seed: 1, adds_up: false };
-        trainer.step_growing(&Rates::OURS, 1.0, 1, Some(growth)).expect("the step succeeds");
+        trainer.optimize(&growing_step(0, Rates::OURS, values)).expect("the step succeeds");
         let found = trainer.scene().expect("the scene can be read");
         let (before, after) = (&trained(&scene).harmonics.values, &trained(&found).harmonics.values);
         let changed = |index: &usize| before.chunks(144).zip(after.chunks(144)).any(|(b, a)| b[*index] != a[*index]);
@@ -377,7 +365,7 @@ fn blobs() -> RuntimeScene {
     RuntimeScene::sliced(blobs.into_iter().map(|(gaussian, _)| gaussian).collect(), harmonics)
 }
 
-/// A dataset of the blobs, with images that say what they cover.
+/// A dataset of the blobs, with images that have coverage.
 struct Lesson {
     folder: TempDir,
     all: Vec<TrainingView>,
@@ -410,7 +398,7 @@ impl Lesson {
         store: Option<&Store>,
         out: Option<&Path>,
         progress: &mut dyn Progress,
-    ) -> Result<FineTuned, Box<OfflineError>> {
+    ) -> Result<FineTuned, Box<TrainError>> {
         let (trained_with, playback) =
             capture_of(&self.all, &CaptureSettings::default(), Clock::default()).expect("ten places");
         let Splits { train: views, validation, .. } = &self.splits;
@@ -469,10 +457,11 @@ fn a_capture_is_trained_from_nothing() {
 }
 
 #[test]
-fn exposures_even_out_cameras_that_differ() {
+fn exposures_even_out_the_gains_of_cameras() {
     let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new();
-    // Three cameras of nine see half the light; the camera held out has the mean gain, which is far from what most have.
+    // Three cameras of nine see half the light; the camera held out has the mean gain, which is far from the gain of
+    // most cameras.
     let gain = |camera: u32| [0.5, 1.0, 1.0][camera as usize % 3];
     const MEAN: f32 = 7.5 / 9.0;
     let cameras = camera_numbers(&lesson.splits.train);
@@ -501,7 +490,7 @@ fn exposures_even_out_cameras_that_differ() {
     }
 }
 
-/// Returns the settings of a training that clones and splits as the original, up to so many Gaussians.
+/// Returns the settings of a training that clones and splits as the original, up to `capacity` Gaussians.
 fn original(steps: usize, capacity: usize) -> FineTuneSettings {
     let usual = settings(steps);
     let cloning = Cloning { capacity, every: 10, from: 10, until: steps / 2, reset_every: steps / 3 };
@@ -543,37 +532,11 @@ fn training_as_the_original_repeats_and_resumes_at_the_same_bytes() {
     assert!(whole.scene == again.scene && whole.curve == again.curve, "a second run has the same result");
     // Between two densifications: the sums of gradients are part of the state.
     let store = lesson.store("original");
-    let stopped = run(Some(&store), &mut Interrupting { left: 55, is_training: false });
+    let stopped = run(Some(&store), &mut Interrupting::new("training", 55));
     let stopped = stopped.map_err(|error| *error);
-    assert!(matches!(stopped, Err(OfflineError::Interrupted { tuned: Some(_) })), "interrupted");
+    assert!(matches!(stopped, Err(TrainError::Interrupted { tuned: Some(_) })), "interrupted");
     let resumed = run(Some(&store), &mut NoProgress).expect("the capture is trained");
     assert!(resumed.scene == whole.scene && resumed.curve == whole.curve, "the resumed run has the same result");
-}
-
-/// Interrupts training after so many steps.
-struct Interrupting {
-    left: usize,
-    is_training: bool,
-}
-
-impl Progress for Interrupting {
-    fn begin(&mut self, task: &'static str, _: usize) {
-        self.is_training = task == "training";
-    }
-
-    fn advance(&mut self) {
-        self.left = self.left.saturating_sub(usize::from(self.is_training));
-    }
-
-    fn finish(&mut self) {
-        self.is_training = false;
-    }
-
-    fn note(&mut self, _: &str) {}
-
-    fn is_interrupted(&self) -> bool {
-        self.left == 0
-    }
 }
 
 #[test]
@@ -598,12 +561,9 @@ fn training_from_nothing_repeats_and_resumes_at_the_same_bytes() {
     assert!(whole.scene == again.scene && whole.curve == again.curve, "a second run has the same result");
     for left in [22, 37] {
         let store = lesson.store(&left.to_string());
-        let stopped = run(Some(&store), &mut Interrupting { left, is_training: false });
+        let stopped = run(Some(&store), &mut Interrupting::new("training", left));
         let stopped = stopped.map_err(|error| *error);
-        assert!(
-            matches!(stopped, Err(OfflineError::Interrupted { tuned: Some(_) })),
-            "after {left} steps: interrupted"
-        );
+        assert!(matches!(stopped, Err(TrainError::Interrupted { tuned: Some(_) })), "after {left} steps: interrupted");
         let resumed = run(Some(&store), &mut NoProgress).expect("the capture is trained");
         assert!(resumed.scene == whole.scene, "after {left} steps: the resumed run has the same scene");
         assert_eq!(resumed.exposures, whole.exposures, "after {left} steps: the resumed run has the same exposures");

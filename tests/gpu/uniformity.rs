@@ -1,13 +1,13 @@
 //! Uniform control flow around barriers, as browsers require it. naga does not check it for values in workgroup memory.
 //!
-//! In: the shaders of all passes. Out: proof that no barrier depends on a value that may differ between the threads of a workgroup: a thread
-//! index, workgroup memory that is not read by `workgroupUniformLoad`, a buffer that the shader writes, the result of an atomic. The members of
-//! a variable are not distinguished, as in browsers.
+//! In: the shaders of all passes. Out: proof that no barrier depends on a value that may differ between the threads of
+//! a workgroup: a thread index, workgroup memory that is not read by `workgroupUniformLoad`, a buffer that the shader
+//! writes, the result of an atomic. The members of a variable are not distinguished, as in browsers.
 
 use crate::support::composed::{compose, pass_names};
-use bevy_gs4d::internal::renderer::global_sort::AtOnce;
-use bevy_gs4d::internal::renderer::shaders::{COPIED_INSTANCE, MULTISAMPLED};
-use bevy_gs4d::internal::renderer::tile_bins::{Blending, COUNTED, EIGHT_AT_ONCE, LARGE_BATCHES, Lists, OPAQUE};
+use bevy_gs4d::internal::renderer::AtOnce;
+use bevy_gs4d::internal::renderer::{Blending, COUNTED, EIGHT_AT_ONCE, LARGE_BATCHES, Lists, OPAQUE};
+use bevy_gs4d::internal::renderer::{COPIED_INSTANCE, MULTISAMPLED};
 use bevy_gs4d::renderer::Storage;
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -16,8 +16,8 @@ use wgpu::naga::{
     StorageAccess,
 };
 
-/// The results of checks: for each function and the indices of its arguments that vary, whether its value varies, and the faults in it and
-/// in the functions that it calls.
+/// The results of checks: for each function and the indices of its arguments that vary, whether its value varies, and
+/// the faults in it and in the functions that it calls.
 type Results = RefCell<BTreeMap<(usize, BTreeSet<u32>), (bool, Vec<String>)>>;
 
 /// The check of one function.
@@ -137,8 +137,8 @@ impl Check<'_> {
         self.local(argument).map_or_else(|| self.varies(argument), |local| self.locals.contains(&local))
     }
 
-    /// Visits a block. `differs`: only some threads may execute the block. `later`: a barrier follows the block, or is in a loop around it.
-    /// `looped`: a barrier is in the innermost loop around the block.
+    /// Visits a block. `differs`: only some threads may execute the block. `later`: a barrier follows the block, or is
+    /// in a loop around it. `looped`: a barrier is in the innermost loop around the block.
     fn visit(&mut self, block: &Block, differs: bool, later: bool, looped: bool) {
         for (index, statement) in block.iter().enumerate() {
             let later = later || block[index + 1..].iter().any(|next| is_or_has_barrier(self.module, next));

@@ -1,15 +1,16 @@
 //! Checks of every scene that a reader accepts.
 //!
-//! In: a scene. Out: whether it was drawn ([`Outcome`]), or the defect: a value of a picture beyond the limits of the scene, a picture that the
-//! CPU reference and the designs of the GPU draw differently, or a file written from the scene that cannot be read or is another scene.
+//! In: a scene. Out: whether it was drawn ([`Outcome`]), or the defect: a value of a picture beyond the limits of the
+//! scene, a picture that the CPU reference and the designs of the GPU draw differently, or a file written from the
+//! scene that cannot be read or is another scene.
 
 use crate::designs::{self, Expected};
 use crate::limits::Limits;
 use crate::readers::Outcome;
 use crate::support::packed_scene::{self, BLACK, settings};
 use bevy_gs4d::codec::package::{self, PackageError, WriteSettings};
-use bevy_gs4d::offline::orbit::orbit;
-use bevy_gs4d::offline::quantize::compress;
+use bevy_gs4d::offline::compress::compress;
+use bevy_gs4d::offline::draw::orbit;
 use bevy_gs4d::reference;
 use bevy_gs4d::scene::{Bounds, BoundsOverTime, GaussianScene, RuntimeScene};
 use glam::UVec2;
@@ -61,8 +62,8 @@ fn pack(scene: &GaussianScene) -> Result<Option<Vec<u8>>, PackageError> {
     }
 }
 
-/// Checks that a scene can be written, and that the file holds the same scene. Writing is deterministic and without loss, so that
-/// bytes are compared, including those of NaNs.
+/// Checks that a scene can be written, and that the file holds the same scene. Writing is deterministic and without
+/// loss, so that bytes are compared, including those of NaNs.
 fn rewrite(scene: &GaussianScene) -> Result<(), String> {
     let written =
         |scene: &GaussianScene| pack(scene).map_err(|error| format!("is accepted and cannot be written: {error}"));
@@ -81,8 +82,8 @@ pub fn compress_and_read(scene: &RuntimeScene, codebooks: &[usize]) -> Result<()
     draw(&again, DrawnBy::Cpu).map_err(|defect| format!("is compressed, and {defect}"))
 }
 
-/// Draws a scene from the camera of synthetic scenes at the middle of its time, and from cameras around the scene at its first, middle and
-/// last time.
+/// Draws a scene from the camera of synthetic scenes at the middle of its time, and from cameras around the scene at
+/// its first, middle and last time.
 pub fn draw(scene: &RuntimeScene, by: DrawnBy) -> Result<(), String> {
     let [first, last] = scene.trained_with.time_interval;
     let mut views = vec![(packed_scene::view(0.5 * first + 0.5 * last), BLACK)];

@@ -1,14 +1,14 @@
 //! The pictures of both GPU designs, compared with those of the CPU reference.
 //!
-//! In: a scene, views of it, and their frames by the CPU reference. Out: the first defect: a design that fails, a value outside the limits of
-//! the scene, or a frame that differs from the other design or from the CPU reference; and the counts of what was compared. Without a GPU
-//! nothing is compared, which is reported as skipped.
+//! In: a scene, views of it, and their frames by the CPU reference. Out: the first defect: a design that fails, a value
+//! outside the limits of the scene, or a frame that differs from the other design or from the CPU reference; and the
+//! counts of what was compared. Without a GPU nothing is compared, which is reported as skipped.
 
 use crate::limits::Limits;
 use crate::rounding::{Ranges, values_of};
 use crate::support::gpu;
 use crate::support::packed_scene::{self, BLACK};
-use bevy_gs4d::offline::quantize::compress;
+use bevy_gs4d::offline::compress::compress;
 use bevy_gs4d::renderer::{Design, GpuError, Headless};
 use bevy_gs4d::scene::RuntimeScene;
 use bevy_gs4d::view::{Background, Frame, View};
@@ -17,7 +17,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Largest difference of a value, relative to the larger of 1 and the value: that of `tests/gpu/render.rs`.
 const CLOSE: f32 = 1e-3;
-/// Largest difference of the values of a few pixels, in which a splat is drawn by one side only, or two splats are exchanged.
+/// Largest difference of the values of a few pixels, in which a splat is drawn by one side only, or two splats are
+/// exchanged.
 const FEW_CLOSE: f32 = 0.05;
 /// One pixel of this many is one of the few, at least one of a picture.
 const FEW: usize = 200;

@@ -1,7 +1,7 @@
 //! The limits of the values that a picture of a scene can have, whatever draws it.
 //!
-//! In: a scene. Out: the first value of a frame that is not finite, or beyond what the coefficients, the background and the positions of the
-//! scene allow.
+//! In: a scene. Out: the first value of a frame that is not finite, or beyond what the coefficients, the background and
+//! the positions of the scene allow.
 
 use bevy_gs4d::gaussian::{Gaussian, Harmonics};
 use bevy_gs4d::scene::{Form, RuntimeScene, Sliced};

@@ -1,11 +1,13 @@
-//! Changed files for every reader: whatever a file contains, reading it ends within a time limit with an error or a drawable scene.
+//! Changed files for every reader: whatever a file contains, reading it ends within a time limit with an error or a
+//! drawable scene.
 //!
-//! In: the files of `tests/corpus/`, then seeds made here by the crate's own writers and changed: valid containers around wrong contents,
-//! and noise. Out: a program that runs the readers on them, reports every defect with a command that repeats it, and ends with a line of
-//! counts; exit code 1 if there was a defect. `docs/reliability.md` lists the checks.
+//! In: the files of `tests/corpus/`, then seeds made here by the crate's own writers and changed: valid containers
+//! around wrong contents, and noise. Out: a program that runs the readers on them, reports every defect with a command
+//! that repeats it, and ends with a line of counts; exit code 1 if there was a defect. `docs/reliability.md` lists the
+//! checks.
 //!
 //! ```sh
-//! cargo test --features viewer,cli --test mutation                        # the corpus and a few inputs, always the same
+//! cargo test --features viewer,cli --test mutation   # the corpus and a few inputs, always the same
 //! cargo test --release --no-default-features --features cli --test mutation -- --seed 7 --seconds 14400 --keep found
 //! cargo test --features viewer,cli --test mutation -- --seed 7 --reader package --input 1234
 //! cargo test --features viewer,cli --test mutation -- --seed 7 --reader package --draw   # on the GPU, too
@@ -30,6 +32,8 @@ mod support {
     pub mod allocations;
     pub mod dataset;
     pub mod gpu;
+    pub mod gzip;
+    pub mod harness;
     pub mod no_gpu;
     pub mod packed_scene;
     pub mod pth;

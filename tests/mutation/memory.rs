@@ -1,6 +1,7 @@
 //! The memory that an input takes.
 //!
-//! In: every allocation of the process. Out: the most bytes that were allocated at any moment since an input began, and the largest request.
+//! In: every allocation of the process. Out: the most bytes that were allocated at any moment since an input began, and
+//! the largest request.
 
 use crate::support::allocations::{ALLOCATED, LARGEST, PEAK};
 use std::sync::atomic::{AtomicUsize, Ordering};

@@ -2,16 +2,13 @@
 //!
 //! In: the arguments of the process, including those of the usual test harness. Out: [`Options`].
 
+use crate::support::harness::own_arguments;
 use clap::Parser;
-use std::ffi::OsString;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 /// Inputs of each reader unless the command line says otherwise: those of a plain `cargo test`.
 const INPUTS: u64 = 60;
-
-/// Arguments of the usual test harness, which `cargo test -- ARGUMENTS` hands to every test binary.
-const FOREIGN: [&str; 6] = ["--nocapture", "--no-capture", "--show-output", "--quiet", "-q", "--exact"];
 
 /// Runs every reader on changed files and checks the outcomes.
 #[derive(Parser)]
@@ -52,11 +49,7 @@ pub struct Options {
 impl Options {
     /// Returns the options that the process was started with.
     pub fn of_command_line() -> Self {
-        let foreign = |argument: &OsString| {
-            let text = argument.to_string_lossy();
-            FOREIGN.contains(&&*text) || text.starts_with("--test-threads=")
-        };
-        Self::parse_from(std::env::args_os().filter(|argument| !foreign(argument)))
+        Self::parse_from(own_arguments())
     }
 
     /// Returns whether a reader is wanted.

@@ -1,7 +1,8 @@
 //! The ranges in which the values of a picture may lie.
 //!
-//! In: a frame of the CPU reference, and the scene. Out: [`Ranges`]: the values of the frame, or the ranges of frames of the scene with all of
-//! its numbers rounded differently. A picture that changes as much by rounding as by the renderer shows no defect of the renderer.
+//! In: a frame of the CPU reference, and the scene. Out: [`Ranges`]: the values of the frame, or the ranges of frames
+//! of the scene with all of its numbers rounded differently. A picture that changes as much by rounding as by the
+//! renderer shows no defect of the renderer.
 
 use crate::limits::sliced;
 use crate::support::random::Random;
@@ -23,7 +24,8 @@ type Values = [f32; 5];
 pub struct Ranges {
     low: Vec<Values>,
     high: Vec<Values>,
-    /// The brightest color that the scene can show, at least 1: a transmittance that differs by 0.001 changes a color by this part of it.
+    /// The brightest color that the scene can show, at least 1: a transmittance that differs by 0.001 changes a color
+    /// by this part of it.
     brightest: f32,
 }
 
@@ -34,7 +36,8 @@ impl Ranges {
         Self { high: low.clone(), low, brightest: brightest.max(1.0) }
     }
 
-    /// Returns the ranges of the frames of a scene whose numbers are rounded differently; `self` has the values of one of these.
+    /// Returns the ranges of the frames of a scene whose numbers are rounded differently; `self` has the values of one
+    /// of these.
     pub fn rounded(mut self, scene: &RuntimeScene, view: &View, background: Background) -> Self {
         for seed in 0..FRAMES {
             let frame = reference::render(&rounded(scene, seed), view, background);
@@ -54,8 +57,8 @@ impl Ranges {
         self.low.len()
     }
 
-    /// Returns the distance of the values of a pixel from its ranges, beyond the width of the ranges again: the largest, relative to the
-    /// larger of 1 and the value, for colors to the brightest color of the scene.
+    /// Returns the distance of the values of a pixel from its ranges, beyond the width of the ranges again: the
+    /// largest, relative to the larger of 1 and the value, for colors to the brightest color of the scene.
     pub fn distance(&self, found: &Frame, pixel: usize) -> f32 {
         let (low, high, found) = (self.low[pixel], self.high[pixel], values_of(found, pixel));
         let one = |at: usize| {
@@ -86,7 +89,8 @@ fn values(frame: &Frame) -> Vec<Values> {
     (0..frame.transmittance.len()).map(|pixel| values_of(frame, pixel)).collect()
 }
 
-/// Returns a scene in single precision, with every number of a Gaussian and its color changed by a part of [`ROUNDING`].
+/// Returns a scene in single precision, with every number of a Gaussian and its color changed by a part of
+/// [`ROUNDING`].
 fn rounded(scene: &RuntimeScene, seed: u64) -> RuntimeScene {
     let mut random = Random::new(seed);
     let mut change = |value: &mut f32| *value *= 1.0 + (random.below(2001) as f32 - 1000.0) * 1e-3 * ROUNDING;

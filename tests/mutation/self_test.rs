@@ -1,6 +1,7 @@
 //! Defects that the checks must find.
 //!
-//! In: readers and pictures with a known defect. Out: nothing; the program ends with a panic if a check does not find the defect.
+//! In: readers and pictures with a known defect. Out: nothing; the program ends with a panic if a check does not find
+//! the defect.
 
 use crate::designs::{self, Expected};
 use crate::limits::Limits;
@@ -28,8 +29,8 @@ impl Reader for Swallows {
     }
 }
 
-/// Checks that a panic in a helper thread, a picture beyond the limits of its scene, and a picture of another scene are defects, and that the
-/// right picture is none.
+/// Checks that a panic in a helper thread, a picture beyond the limits of its scene, and a picture of another scene are
+/// defects, and that the right picture is none.
 pub fn run() {
     let Seen { outcome, .. } =
         watch("a panic in a helper thread", &(Arc::new(Swallows) as Arc<dyn Reader>), &Arc::from([]));

@@ -1,7 +1,7 @@
 //! The inputs read so far, and the defects found.
 //!
-//! In: inputs, one after the other. Out: counts for each reader, a line for each new kind of defect with the command that repeats it, and the
-//! inputs in a folder if one is given.
+//! In: inputs, one after the other. Out: counts for each reader, a line for each new kind of defect with the command
+//! that repeats it, and the inputs in a folder if one is given.
 
 use crate::designs;
 use crate::readers::{Kind, Outcome, Reader};

@@ -1,10 +1,11 @@
 //! A reader run on one input, with limits.
 //!
-//! In: a reader and the bytes to read. Out: the outcome ([`Seen`]): refused or accepted, or a defect: a panic in any thread, caught or not, too
-//! much time or memory, a message with control characters, or a defect that the reader finds in its result.
+//! In: a reader and the bytes to read. Out: the outcome ([`Seen`]): refused or accepted, or a defect: a panic in any
+//! thread, caught or not, too much time or memory, a message with control characters, or a defect that the reader finds
+//! in its result.
 //!
-//! Each input is read on its own thread with a stack of the usual size: endless recursion ends the process, and the message of the system
-//! names the thread, which is named after the input.
+//! Each input is read on its own thread with a stack of the usual size: endless recursion ends the process, and the
+//! message of the system names the thread, which is named after the input.
 
 use crate::memory;
 use crate::readers::{Outcome, Reader};
@@ -69,8 +70,8 @@ fn take_panics() -> Option<String> {
     first.map(|first| if count > 1 { format!("{count} panics, the first: {first}") } else { first })
 }
 
-/// Runs a reader on an input. `name` is the name of the input. An input that takes too long is read again, because other programs may have taken
-/// the processor: the shortest time counts.
+/// Runs a reader on an input. `name` is the name of the input. An input that takes too long is read again, because
+/// other programs may have taken the processor: the shortest time counts.
 pub fn watch(name: &str, reader: &Arc<dyn Reader>, bytes: &Arc<[u8]>) -> Seen {
     let mut seen = watch_once(name, reader, bytes);
     for _ in 1..ATTEMPTS {

@@ -1,7 +1,8 @@
 //! Captures among the particles of `bevy_hanabi`, in headless apps.
 //!
-//! In: a capture of one opaque splat, and an effect of one particle in front of it or behind it. Out: a test that the particle hides the
-//! capture or is hidden by it, with and without multisampling, with and without HDR. Skipped without a GPU (a software driver counts).
+//! In: a capture of one opaque splat, and an effect of one particle in front of it or behind it. Out: a test that the
+//! particle hides the capture or is hidden by it, with and without multisampling, with and without HDR. Skipped without
+//! a GPU (a software driver counts).
 
 use bevy::camera::Hdr;
 use bevy::core_pipeline::tonemapping::Tonemapping;
@@ -79,8 +80,14 @@ fn particles_and_captures_hide_each_other() {
     for (msaa, hdr) in [(Msaa::Off, false), (Msaa::Sample4, false), (Msaa::Off, true), (Msaa::Sample4, true)] {
         let middle = |z| seen(msaa, hdr, z).get_pixel(SIZE.x / 2, SIZE.y / 2).0;
         let [r, g, b, _] = middle(2.0);
-        assert!(r < 20 && g > 235 && b < 20, "{msaa:?}, HDR {hdr}: a particle in front hides the capture: {r}, {g}, {b}");
+        assert!(
+            r < 20 && g > 235 && b < 20,
+            "{msaa:?}, HDR {hdr}: a particle in front hides the capture: {r}, {g}, {b}"
+        );
         let [r, g, b, _] = middle(-2.0);
-        assert!(r > 235 && g < 50 && b < 20, "{msaa:?}, HDR {hdr}: the capture hides a particle behind it: {r}, {g}, {b}");
+        assert!(
+            r > 235 && g < 50 && b < 20,
+            "{msaa:?}, HDR {hdr}: the capture hides a particle behind it: {r}, {g}, {b}"
+        );
     }
 }

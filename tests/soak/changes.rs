@@ -1,7 +1,7 @@
 //! Random changes of a state.
 //!
-//! In: a seed. Out: a [`State`] after each step and a description of the change. Both depend on the seed and the number of the step only, so
-//! that a new app can reproduce the state.
+//! In: a seed. Out: a [`State`] after each step and a description of the change. Both depend on the seed and the number
+//! of the step only, so that a new app can reproduce the state.
 
 use crate::state::{Form, Lens, Placed, Source, State, Viewer};
 use crate::support::random::Random;
@@ -11,7 +11,8 @@ use bevy_gs4d::render::{CaptureSettings, DepthWrite};
 use bevy_gs4d::renderer::Design;
 use std::f32::consts::TAU;
 
-/// Number of steps from one check to the next. At a check all captures are paused, and the app is compared with a new app.
+/// Number of steps from one check to the next. At a check all captures are paused, and the app is compared with a new
+/// app.
 const CHECK: u64 = 50;
 /// Largest number of captures.
 const CAPTURES: usize = 6;

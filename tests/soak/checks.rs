@@ -2,18 +2,12 @@
 //!
 //! In: an app after an update, and its log. Out: the first violated condition, as a text.
 
-use bevy::log::tracing::field::{Field, Visit};
-use bevy::log::tracing::{Event, Level, Subscriber};
-use bevy::log::tracing_subscriber::Layer;
-use bevy::log::tracing_subscriber::layer::Context;
+use crate::support::warning_layer::Warnings;
 use bevy::log::{BoxedLayer, DEFAULT_FILTER, LogPlugin};
 use bevy::prelude::*;
-use bevy::render::RenderApp;
-use bevy::render::render_resource::{CachedPipelineState, PipelineCache};
 use bevy_gs4d::GaussianCapturePlugins;
 use bevy_gs4d::testing;
 use image::RgbaImage;
-use std::fmt::{Debug, Write};
 use std::mem;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -38,32 +32,11 @@ pub fn app(size: UVec2) -> App {
 fn log() -> LogPlugin {
     // As in `testing::app`: an abandoned read-back is not a fault.
     let filter = format!("{DEFAULT_FILTER},bevy_render::gpu_readback=error");
-    LogPlugin { filter, custom_layer: |_| -> Option<BoxedLayer> { Some(Box::new(Warnings)) }, ..default() }
+    LogPlugin { filter, custom_layer: |_| -> Option<BoxedLayer> { Some(Box::new(Warnings(record))) }, ..default() }
 }
 
-/// A layer that records warnings and errors.
-struct Warnings;
-
-impl<S: Subscriber> Layer<S> for Warnings {
-    fn on_event(&self, event: &Event<'_>, _: Context<'_, S>) {
-        // More severe levels are less in the order of levels.
-        if *event.metadata().level() <= Level::WARN {
-            let mut message = Message(String::new());
-            event.record(&mut message);
-            LOGGED.lock().unwrap_or_else(PoisonError::into_inner).push(message.0);
-        }
-    }
-}
-
-struct Message(String);
-
-impl Visit for Message {
-    fn record_debug(&mut self, field: &Field, value: &dyn Debug) {
-        if field.name() == "message" {
-            // Writing to a `String` does not fail.
-            let _ = write!(self.0, "{value:?}");
-        }
-    }
+fn record(text: String) {
+    LOGGED.lock().unwrap_or_else(PoisonError::into_inner).push(text);
 }
 
 /// Returns the warnings and errors since the last call.
@@ -84,26 +57,13 @@ pub fn check_running(app: &App) -> Result<(), String> {
     app.should_exit().map_or(Ok(()), |_| Err("the app wants to exit".to_owned()))
 }
 
-/// Checks that no pipeline has failed to compile.
-///
-/// # Errors
-/// The error of the first failed pipeline.
-pub fn check_pipelines(app: &App) -> Result<(), String> {
-    for pipeline in app.sub_app(RenderApp).world().resource::<PipelineCache>().pipelines() {
-        if let CachedPipelineState::Err(failure) = &pipeline.state {
-            return Err(format!("a pipeline failed: {failure}"));
-        }
-    }
-    Ok(())
-}
-
 /// Returns the largest difference between two pictures in any channel, in 255ths.
 pub fn difference(a: &[u8], b: &[u8]) -> u8 {
     a.iter().zip(b).map(|(a, b)| a.abs_diff(*b)).max().unwrap_or_default()
 }
 
-/// Checks that two pictures are bitwise equal. Every pass has a fixed order: splats of equal depth are blended in the order of their captures,
-/// which the new app receives as an option.
+/// Checks that two pictures are bitwise equal. Every pass has a fixed order: splats of equal depth are blended in the
+/// order of their captures, which the new app receives as an option.
 ///
 /// # Errors
 /// The size of the difference.

@@ -1,12 +1,14 @@
-//! Cuts: from one frame to the next, the camera's pose and the time change; some cuts also change the camera, the design or the captures.
+//! Cuts: from one frame to the next, the camera's pose and the time change; some cuts also change the camera, the
+//! design or the captures.
 //!
-//! In: a seed and a number of cuts. Out: the closing line, if the first frame after each cut equals the frames after it; else the first cut
-//! for which it does not.
+//! In: a seed and a number of cuts. Out: the closing line, if the first frame after each cut equals the frames after
+//! it; else the first cut for which it does not.
 //!
-//! A view has room for 65,536 pairs of splats and tiles, or for two pairs per Gaussian, before it has counted pairs, and for 1.5 times the
-//! counted pairs afterwards (`renderer`, "Room"). Every tenth cut goes close to a crowd of large, faint splats with more pairs, and every
-//! second of these cuts has a new camera or another design, whose room is that of a new view. A frame with more pairs than the largest
-//! possible room is counted as overflowing; a run without such a frame fails.
+//! A view has room for 65,536 pairs of splats and tiles, or for two pairs per Gaussian, before it has counted pairs,
+//! and for 1.5 times the counted pairs afterwards (`renderer`, "Room"). Every tenth cut goes close to a crowd of large,
+//! faint splats with more pairs, and every second of these cuts has a new camera or another design, whose room is that
+//! of a new view. A frame with more pairs than the largest possible room is counted as overflowing; a run without such
+//! a frame fails.
 
 use crate::changes::{spread, unit};
 use crate::checks::{self, difference, shows_something};
@@ -29,13 +31,13 @@ use std::time::Instant;
 
 /// Size of the picture in pixels. Rows of this width are read back without padding.
 const SIZE: UVec2 = UVec2::new(256, 192);
-/// Largest allowed difference between two frames, in 255ths: a tile without room is blended in other steps, whose sums are rounded
-/// differently.
+/// Largest allowed difference between two frames, in 255ths: a tile without room is blended in other steps, whose sums
+/// are rounded differently.
 const APART: u8 = 1;
 /// Number of pairs for which a view has room before it has counted pairs.
 const FIRST_ROOM: u32 = 1 << 16;
-/// Numbers of updates after a cut: after a cut close to the crowd, until frames have room; after other cuts; after a new capture, until its
-/// upload is complete.
+/// Numbers of updates after a cut: after a cut close to the crowd, until frames have room; after other cuts; after a
+/// new capture, until its upload is complete.
 const UPDATES: [usize; 3] = [4, 2, 10];
 /// Bytes of captures that are uploaded in a frame, so that the upload of a new capture takes several frames.
 const BUDGET: u64 = 48 << 10;
@@ -104,7 +106,8 @@ pub fn run(seed: u64, cuts: u64) -> Result<String, String> {
     ))
 }
 
-/// Returns the largest difference between the last frame of a cut and its other frames. `before` is the last frame of the cut before.
+/// Returns the largest difference between the last frame of a cut and its other frames. `before` is the last frame of
+/// the cut before.
 fn judge(cut: &Cut, before: &[u8]) -> Result<u8, String> {
     let Some((last, frames)) = cut.frames.split_last() else { return Ok(0) };
     let as_before = |frame: &&Vec<u8>| cut.appears && difference(frame, before) <= APART;
@@ -138,7 +141,8 @@ impl Cutter {
         Ok(cutter)
     }
 
-    /// Makes a cut, and returns the frames that have arrived since. The first of them is the last frame of the cut before.
+    /// Makes a cut, and returns the frames that have arrived since. The first of them is the last frame of the cut
+    /// before.
     fn cut(&mut self, number: u64) -> Result<Cut, String> {
         let close = number % 10 == 9;
         let mut appears = None;
@@ -172,7 +176,8 @@ impl Cutter {
         Ok(Cut { number, appears: appears.is_some(), overflows: close && self.pairs() > room, frames })
     }
 
-    /// Moves the camera, `close` to the crowd or far from it, and sets all captures to other times. `renew` makes the view a new one.
+    /// Moves the camera, `close` to the crowd or far from it, and sets all captures to other times. `renew` makes the
+    /// view a new one.
     fn go(&mut self, close: bool, renew: bool) {
         let distance = if close { 0.8 + 1.6 * unit(&mut self.random) } else { 8.0 + 30.0 * unit(&mut self.random) };
         let place = distance * spread(&mut self.random).normalize_or(Vec3::X);

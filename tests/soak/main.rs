@@ -1,9 +1,10 @@
-//! The soak test of the plugin, and the test of cuts: after any sequence of changes to captures and cameras, an app draws the same pictures
-//! as a new app in the same state, from the first frame on.
+//! The soak test of the plugin, and the test of cuts: after any sequence of changes to captures and cameras, an app
+//! draws the same pictures as a new app in the same state, from the first frame on.
 //!
-//! In: a seed. Out: a program that changes an app with captures at random, and cuts in another app. It prints the first defect with the
-//! options that reproduce it, and at the end a line of counts for each of the two tests; the exit code is 1 after a defect.
-//! `docs/reliability.md` lists the checks. Without a GPU (a software driver counts) the program skips both tests.
+//! In: a seed. Out: a program that changes an app with captures at random, and cuts in another app. It prints the first
+//! defect with the options that reproduce it, and at the end a line of counts for each of the two tests; the exit code
+//! is 1 after a defect. `docs/reliability.md` lists the checks. Without a GPU (a software driver counts) the program
+//! skips both tests.
 //!
 //! ```sh
 //! cargo test --features viewer,cli --test soak                             # 100 changes and 40 cuts of seed 1
@@ -12,7 +13,8 @@
 //! cargo test --features viewer,cli --test soak -- --seed 7 --steps 1234    # up to a defect
 //! ```
 //!
-//! The changes depend on the seed and the number of the change only. The times at which files are loaded vary between runs.
+//! The changes depend on the seed and the number of the change only. The times at which files are loaded vary between
+//! runs.
 
 mod changes;
 mod checks;
@@ -27,8 +29,11 @@ mod state;
 mod support {
     pub mod allocations;
     pub mod coded_scene;
+    pub mod harness;
+    pub mod pipelines;
     pub mod random;
     pub mod skip;
+    pub mod warning_layer;
 }
 
 use bevy_gs4d::testing::{self, TestingError};

@@ -6,10 +6,10 @@ use crate::support::allocations::ALLOCATED;
 use std::fs;
 use std::sync::atomic::Ordering;
 
-/// Largest growth of the median from the third to the last quarter, percent. The resident set reaches its final size after about 800 changes,
-/// which on a busy machine take half of five minutes: it contains the driver's allocations for pipelines that are compiled late, and varies
-/// because the allocator serves many sizes from many threads. The remaining growth of allocated bytes is Bevy's: its clustering of lights
-/// keeps 40 bytes for each view and frame.
+/// Largest growth of the median from the third to the last quarter, percent. The resident set reaches its final size
+/// after about 800 changes, which on a busy machine take half of five minutes: it contains the driver's allocations for
+/// pipelines that are compiled late, and varies because the allocator serves many sizes from many threads. The
+/// remaining growth of allocated bytes is Bevy's: its clustering of lights keeps 40 bytes for each view and frame.
 const GROWTH_PERCENT: u64 = 5;
 /// Smallest number of values for a verdict.
 const LEAST: usize = 8;

@@ -2,17 +2,14 @@
 //!
 //! In: the arguments of the process, including arguments for the default test harness. Out: [`Options`].
 
+use crate::support::harness::own_arguments;
 use clap::Parser;
-use std::ffi::OsString;
 use std::path::PathBuf;
 use std::time::Duration;
 
 /// Numbers of changes and cuts without options, as in a plain `cargo test`.
 const STEPS: u64 = 100;
 const CUTS: u64 = 40;
-
-/// Arguments of the default test harness, which `cargo test -- ARGUMENTS` passes to every test binary.
-const FOREIGN: [&str; 6] = ["--nocapture", "--no-capture", "--show-output", "--quiet", "-q", "--exact"];
 
 /// Changes a Bevy app with captures at random, and checks its pictures, its log and its memory.
 #[derive(Parser)]
@@ -70,11 +67,7 @@ pub struct Until {
 impl Options {
     /// Returns the options that the process was started with.
     pub fn of_command_line() -> Self {
-        let foreign = |argument: &OsString| {
-            let text = argument.to_string_lossy();
-            FOREIGN.contains(&&*text) || text.starts_with("--test-threads=")
-        };
-        Self::parse_from(std::env::args_os().filter(|argument| !foreign(argument)))
+        Self::parse_from(own_arguments())
     }
 
     /// Returns the pictures to draw for a check; `None` if this process was not started by a check.

@@ -1,7 +1,7 @@
 //! The soak test: an app that is changed at random.
 //!
-//! In: a seed and the end of the test. Out: the closing line, if the app's pictures equal those of new apps in the same state, its log has no
-//! warnings and its memory is freed; else the first defect, with the options that reproduce it.
+//! In: a seed and the end of the test. Out: the closing line, if the app's pictures equal those of new apps in the same
+//! state, its log has no warnings and its memory is freed; else the first defect, with the options that reproduce it.
 
 use crate::changes::Changes;
 use crate::checks;
@@ -103,8 +103,8 @@ fn change(options: &Options, until: Until, tail: &mut Tail) -> Result<String, St
     ))
 }
 
-/// Compares all pictures of an app with those of a new app in a separate process, so that the state of one process cannot affect the pictures
-/// of the other.
+/// Compares all pictures of an app with those of a new app in a separate process, so that the state of one process
+/// cannot affect the pictures of the other.
 fn compare(options: &Options, step: u64, stage: &mut Stage, compared: &mut Compared) -> Result<(), String> {
     let seen = stage.pictures()?;
     let folder = tempfile::tempdir().map_err(|error| format!("no temporary folder: {error}"))?;

@@ -1,10 +1,11 @@
 //! An app that shows a state.
 //!
-//! In: a sequence of [`State`]s. Out: an app to which only the differences from one state to the next are applied, as in a game, and its
-//! pictures.
+//! In: a sequence of [`State`]s. Out: an app to which only the differences from one state to the next are applied, as
+//! in a game, and its pictures.
 
 use crate::checks;
 use crate::state::{Placed, Source, State, Viewer, scene};
+use crate::support::pipelines::check_pipelines;
 use bevy::core_pipeline::tonemapping::{DebandDither, Tonemapping};
 use bevy::prelude::*;
 use bevy::render::render_resource::{Extent3d, PollType};
@@ -30,8 +31,8 @@ const STEP: Duration = Duration::from_millis(20);
 const TIMEOUT: Duration = Duration::from_secs(120);
 /// Number of updates after which a camera without a capture has freed all of its memory, with a margin.
 const IDLE: usize = 130;
-/// Largest number of frames that the GPU may be behind, as with a window. Without this limit the CPU would run ahead, and wgpu keeps the
-/// command buffers of the largest number of frames that were ever in flight at once.
+/// Largest number of frames that the GPU may be behind, as with a window. Without this limit the CPU would run ahead,
+/// and wgpu keeps the command buffers of the largest number of frames that were ever in flight at once.
 const FRAMES_IN_FLIGHT: usize = 3;
 
 /// An app and the state that it shows.
@@ -48,8 +49,8 @@ pub struct Stage {
 }
 
 impl Stage {
-    /// Starts an app for a state, without its captures and cameras. `order` has the numbers of the captures in the order in which their splats
-    /// of equal depth are drawn.
+    /// Starts an app for a state, without its captures and cameras. `order` has the numbers of the captures in the
+    /// order in which their splats of equal depth are drawn.
     ///
     /// # Errors
     /// The app cannot be started, or logs a message about captures.
@@ -119,7 +120,7 @@ impl Stage {
             pictures.push(testing::read(&mut self.app, target).map_err(failed)?);
         }
         checks::check_running(&self.app)?;
-        checks::check_pipelines(&self.app)?;
+        check_pipelines(&self.app)?;
         Ok(pictures)
     }
 
@@ -167,7 +168,7 @@ impl Stage {
     /// Writes the file completely or not at all.
     fn write_file(&self, state: &State) -> Result<(), String> {
         let scene = GaussianScene::from(state.file_scene());
-        offline::save(&self.file(), &scene, &WriteSettings { level: 1 }).map_err(|error| error.to_string())
+        offline::work::save(&self.file(), &scene, &WriteSettings { level: 1 }).map_err(|error| error.to_string())
     }
 
     /// Updates the app until the newest version of the file has been loaded, if a capture shows the file.

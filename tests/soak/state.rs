@@ -1,7 +1,7 @@
 //! The state of an app, as plain data.
 //!
-//! In: nothing; [`changes`](crate::changes) makes one state from another. Out: a [`State`], which a [`Stage`](crate::stage::Stage) applies
-//! to an app, and the scenes of its captures.
+//! In: nothing; [`changes`](crate::changes) makes one state from another. Out: a [`State`], which a
+//! [`Stage`](crate::stage::Stage) applies to an app, and the scenes of its captures.
 
 use crate::support::coded_scene::coded_scene;
 use bevy::camera::ScalingMode;
@@ -18,8 +18,8 @@ pub struct State {
     pub size: UVec2,
     /// Version of the file: the number of times that it has been rewritten.
     pub version: u64,
-    /// Whether captures are drawn at their coarsest level of detail instead of with all Gaussians. Levels in between are not tested: they
-    /// depend on the level of the frame before, to avoid flicker, and may differ in a new app.
+    /// Whether captures are drawn at their coarsest level of detail instead of with all Gaussians. Levels in between
+    /// are not tested: they depend on the level of the frame before, to avoid flicker, and may differ in a new app.
     pub coarse: bool,
     pub captures: Vec<Placed>,
     pub cameras: Vec<Viewer>,

@@ -2,7 +2,7 @@
 //!
 //! In: a number of Gaussians, degrees of color. Out: a packed scene as after compression, with two codebooks.
 
-use bevy_gs4d::internal::scene::packed::encode::Bits;
+use bevy_gs4d::internal::scene::Bits;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{CodedColors, Form, PackedColors, PackedScene, RuntimeScene, TemporalFilter};
 

@@ -2,6 +2,8 @@
 //!
 //! In: arguments. Out: exit code, standard output, standard error.
 
+use crate::support::no_gpu::no_gpu;
+use bevy_gs4d::renderer::GpuContext;
 use serde_json::Value;
 use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
@@ -55,8 +57,8 @@ macro_rules! arguments {
 }
 pub(crate) use arguments;
 
-/// Returns the words of a command line. A word in capitals is the file of this name in the folder, in small letters; `OUT` has a number, so that
-/// no two commands write the same file.
+/// Returns the words of a command line. A word in capitals is the file of this name in the folder, in small letters;
+/// `OUT` has a number, so that no two commands write the same file.
 pub fn words(command: &str, folder: &Path, number: usize) -> Vec<OsString> {
     let word = |word: &str| -> OsString {
         match word.strip_prefix("OUT") {
@@ -66,6 +68,15 @@ pub fn words(command: &str, folder: &Path, number: usize) -> Vec<OsString> {
         }
     };
     command.split_whitespace().map(word).collect()
+}
+
+/// Returns whether the command has a GPU; without one, reports that the test, or a part of it, is skipped.
+pub fn has_gpu() -> bool {
+    let found = GpuContext::headless(None).is_ok();
+    if !found {
+        no_gpu();
+    }
+    found
 }
 
 /// Returns a temporary folder.

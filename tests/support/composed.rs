@@ -7,18 +7,20 @@ use bevy_gs4d::renderer::GpuError;
 use wgpu::naga::Module;
 use wgpu::naga::front::wgsl::parse_str;
 
+/// Returns the passes of the renderer, of scoring and training, and of the optional parts of training.
+fn sets() -> impl Iterator<Item = &'static renderer::ShaderSet> {
+    [&renderer::SHADERS, &offline::engine::SHADERS].into_iter().chain(offline::train::PART_SHADERS)
+}
+
 /// Returns the names of all passes.
 pub fn pass_names() -> impl Iterator<Item = &'static str> {
-    renderer::shaders::SHADERS.names().chain(offline::shaders::SHADERS.names())
+    sets().flat_map(|set| set.names())
 }
 
 /// Returns the WGSL text of a pass with these definitions.
 pub fn text_of(name: &str, definitions: &[&str]) -> Result<String, GpuError> {
-    if offline::shaders::SHADERS.names().any(|pass| pass == name) {
-        offline::shaders::SHADERS.compose(name, definitions)
-    } else {
-        renderer::shaders::SHADERS.compose(name, definitions)
-    }
+    let set = sets().find(|set| set.names().any(|pass| pass == name));
+    set.unwrap_or(&renderer::SHADERS).compose(name, definitions)
 }
 
 /// Composes a pass with these definitions.

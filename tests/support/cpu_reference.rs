@@ -1,7 +1,7 @@
 //! Scenes and cameras that both a Bevy app and the CPU reference draw.
 //!
-//! In: Gaussians, a camera's transform. Out: a scene for both, the same view for [`bevy_gs4d::reference`], and the difference between two
-//! pictures.
+//! In: Gaussians, a camera's transform. Out: a scene for both, the same view for [`bevy_gs4d::reference`], and the
+//! difference between two pictures.
 
 use crate::support::offscreen_app::FOV_Y;
 use bevy::prelude::*;
@@ -37,8 +37,8 @@ pub fn eye() -> Transform {
     Transform::from_xyz(0.6, 0.9, 3.5).looking_at(Vec3::ZERO, Vec3::Y)
 }
 
-/// Returns the view of `offscreen_app::spawn_camera` with a target of `size` pixels, for the CPU reference. `time` is in the capture's unit of
-/// time.
+/// Returns the view of `offscreen_app::spawn_camera` with a target of `size` pixels, for the CPU reference. `time` is
+/// in the capture's unit of time.
 pub fn view(camera: &Transform, size: UVec2, time: f32) -> View {
     let tan_y = (FOV_Y / 2.0).tan();
     let lens = Lens::Fov { tan: Vec2::new(tan_y * size.x as f32 / size.y as f32, tan_y) };

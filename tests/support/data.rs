@@ -5,7 +5,8 @@
 use crate::support::skip::skip;
 use std::path::PathBuf;
 
-/// Returns the folder that contains `toybox/` and `standup/`; without the variable, reports the skipped test and returns `None`.
+/// Returns the folder that contains `toybox/` and `standup/`; without the variable, reports the skipped test and
+/// returns `None`.
 pub fn data() -> Option<PathBuf> {
     let folder = std::env::var_os("GS4D_DATA").map(PathBuf::from);
     if folder.is_none() {

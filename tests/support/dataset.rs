@@ -1,7 +1,7 @@
 //! A dataset of pictures of a scene.
 //!
-//! In: a scene and a folder. Out: `transforms_train.json` and `transforms_test.json` in the folder, and the images that they name, drawn by
-//! the CPU reference and rounded to 8 bits.
+//! In: a scene and a folder. Out: `transforms_train.json` and `transforms_test.json` in the folder, and the images that
+//! they name, drawn by the CPU reference and rounded to 8 bits.
 
 use bevy_gs4d::reference;
 use bevy_gs4d::scene::RuntimeScene;
@@ -15,8 +15,8 @@ use std::path::Path;
 /// Horizontal field of view, radians.
 const FOV: f32 = 0.7;
 
-/// Writes both splits: `cameras` cameras on a circle around `center`, each at `times` times from 0 to 1; the test split has two cameras at
-/// other angles. The images are drawn if `images` is true.
+/// Writes both splits: `cameras` cameras on a circle around `center`, each at `times` times from 0 to 1; the test split
+/// has two cameras at other angles. The images are drawn if `images` is true.
 pub fn write(
     folder: &Path,
     scene: &RuntimeScene,

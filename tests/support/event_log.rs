@@ -1,10 +1,13 @@
 //! Records of an app's events, by observers and by readers of messages, whose records must be equal.
 //!
-//! In: an app and the types of events to record. Out: the events as texts, in the order in which observers received them.
+//! In: an app and the types of events to record. Out: the events as texts, in the order in which observers received
+//! them.
 
 use bevy::ecs::schedule::ScheduleLabel;
 use bevy::prelude::*;
+use bevy_gs4d::asset::CaptureFailed;
 use std::fmt::Debug;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// The events that observers have received, in order.
 #[derive(Resource, Default)]
@@ -14,7 +17,8 @@ pub struct Observed(pub Vec<String>);
 #[derive(Resource, Default)]
 struct Read(Vec<String>);
 
-/// Records one type of event. The reader runs in `schedule`; it receives events sent later in a frame in the next frame.
+/// Records one type of event. The reader runs in `schedule`; it receives events sent later in a frame in the next
+/// frame.
 pub fn record<E: Message + EntityEvent + Debug>(app: &mut App, schedule: impl ScheduleLabel) {
     app.init_resource::<Observed>().init_resource::<Read>();
     app.add_observer(|event: On<E>, mut observed: ResMut<Observed>| observed.0.push(debug(event.event())));
@@ -37,4 +41,14 @@ pub fn take_events(app: &mut App) -> Vec<String> {
     read.sort();
     assert_eq!(sorted, read, "observers and readers receive the same events");
     observed
+}
+
+/// Collects the failures of captures from now on.
+pub fn failures_of(app: &mut App) -> Arc<Mutex<Vec<CaptureFailed>>> {
+    let failures = Arc::new(Mutex::new(Vec::new()));
+    let sink = failures.clone();
+    app.add_observer(move |failure: On<CaptureFailed>| {
+        sink.lock().unwrap_or_else(PoisonError::into_inner).push(failure.event().clone());
+    });
+    failures
 }

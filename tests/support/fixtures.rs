@@ -1,7 +1,7 @@
 //! Captures placed in headless apps, and meshes among them.
 //!
-//! In: an app, scenes, components of their entities and cameras. Out: entities, and the comparison of the app's picture with the picture of
-//! the CPU reference, or of the renderer without Bevy.
+//! In: an app, scenes, components of their entities and cameras. Out: entities, and the comparison of the app's picture
+//! with the picture of the CPU reference, or of the renderer without Bevy.
 
 use crate::support::blob::blob;
 use crate::support::cpu_reference::{DURATION, SIZE, add, difference, scene};
@@ -49,6 +49,11 @@ pub fn synthetic(count: usize, seed: u64, filtered: bool) -> RuntimeScene {
         scene.filter = Some(TemporalFilter::support(scene.iter(), interval, 0.05, 4));
     }
     scene
+}
+
+/// Returns the pose of a camera that sees a scene of [`synthetic`].
+pub fn synthetic_eye() -> Transform {
+    Transform::from_xyz(0.5, -3.0, 1.5).looking_at(Vec3::ZERO, Vec3::Z)
 }
 
 /// Spawns a capture, paused at its start, with the components of `bundle`.

@@ -1,7 +1,8 @@
 //! A material of one color, for meshes among captures.
 //!
-//! In: a color. Out: the material [`Flat`] and its [`FlatPlugin`]. A software driver compiles a pipeline of `StandardMaterial` in seconds, one of
-//! this material in a tenth of that; tests of lit, tonemapped or transmissive meshes use `StandardMaterial`.
+//! In: a color. Out: the material [`Flat`] and its [`FlatPlugin`]. A software driver compiles a pipeline of
+//! `StandardMaterial` in seconds, one of this material in a tenth of that; tests of lit, tonemapped or transmissive
+//! meshes use `StandardMaterial`.
 
 use bevy::asset::uuid_handle;
 use bevy::prelude::*;

@@ -10,6 +10,7 @@ use serde::Deserialize;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
+/// Names of the golden scenes, each a folder of `tests/golden/`.
 pub const SCENES: [&str; 5] = ["rot4d_sh3_t2", "nonrot4d_sh3_t1", "static_l_eq_r", "static_as_3d", "intrinsics_env"];
 
 /// One view of a golden scene.
@@ -42,6 +43,7 @@ struct CameraEntry {
     fl_y: Option<f32>,
 }
 
+/// Returns the folder of the golden scenes.
 pub fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden")
 }
@@ -53,6 +55,7 @@ pub fn all_views() -> Vec<GoldenView> {
     views
 }
 
+/// Reads a file of float32 values.
 pub fn floats(path: &Path) -> Vec<f32> {
     let bytes = std::fs::read(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
@@ -167,8 +170,8 @@ fn make_view(entry: &CameraEntry) -> View {
     view
 }
 
-/// Returns the largest absolute differences: of color, depth and alpha outside of the ambiguous pixels, and of color or alpha in ambiguous
-/// pixels, where a splat at a threshold may or may not count.
+/// Returns the largest absolute differences: of color, depth and alpha outside of the ambiguous pixels, and of color or
+/// alpha in ambiguous pixels, where a splat at a threshold may or may not count.
 pub fn differences(golden: &GoldenView, frame: &Frame) -> ([f32; 3], f32) {
     let count = golden.alpha.len();
     let (mut clear, mut ambiguous) = ([0.0f32; 3], 0.0f32);

@@ -1,7 +1,8 @@
 //! The golden gradients: gradients of a loss on a golden view with respect to the raw tensors of its scene.
 //!
-//! In: `tests/golden/<scene>/<view>.grad.json`, computed in double precision; its `compat` has the results of the original CUDA code. Out:
-//! [`GoldenGradient`]s, each with a view, its trained scene, the loss and the expected gradients.
+//! In: `tests/golden/<scene>/<view>.grad.json`, computed in double precision; its `compat` has the results of the
+//! original CUDA code. Out: [`GoldenGradient`]s, each with a view, its trained scene, the loss and the expected
+//! gradients.
 
 use crate::support::golden::{self, GoldenView};
 use bevy_gs4d::gaussian::{GradientMode, SliceSettings};

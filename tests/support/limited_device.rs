@@ -1,6 +1,7 @@
 //! A device with low limits, on which small scenes reach the limits that huge scenes reach on other devices.
 //!
-//! In: the default adapter, a number of bytes. Out: a renderer on that adapter with storage buffer bindings of at most so many bytes.
+//! In: the default adapter, a number of bytes. Out: a renderer on that adapter with storage buffer bindings of at most
+//! this size.
 
 use crate::support::no_gpu::no_gpu;
 use bevy_gs4d::renderer::{GpuContext, Headless, ShaderChecks};
@@ -14,7 +15,7 @@ pub fn headless() -> Option<Headless> {
     binding(BINDING)
 }
 
-/// Returns the same with storage buffer bindings of at most so many bytes.
+/// Returns the renderer of [`headless`] with storage buffer bindings of at most `bytes` bytes.
 pub fn binding(bytes: u64) -> Option<Headless> {
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
         backends: wgpu::Backends::PRIMARY,

@@ -1,6 +1,7 @@
 //! Pictures of an `.npz` archive, as NumPy writes it.
 //!
-//! In: an archive and the name of an array of views × 3 × height × width (float32 or float16). Out: one picture per view.
+//! In: an archive and the name of an array of views × 3 × height × width (float32 or float16). Out: one picture per
+//! view.
 
 use super::npy;
 use bevy_gs4d::view::Picture;

@@ -1,6 +1,7 @@
 //! Headless Bevy apps for tests.
 //!
-//! In: the size of a picture. Out: an app that draws into a picture without a window, a camera of the app, and the picture.
+//! In: the size of a picture. Out: an app that draws into a picture without a window, a camera of the app, and the
+//! picture.
 
 use crate::support::flat::FlatPlugin;
 use crate::support::no_gpu::no_gpu;
@@ -37,7 +38,8 @@ fn app_with(size: UVec2, adjust: fn(PluginGroupBuilder) -> PluginGroupBuilder) -
     Some(app)
 }
 
-/// Returns whether apps run as shipped games do: without shader checks, with pipelined rendering, with pipelines compiled in the background.
+/// Returns whether apps run as shipped games do: without shader checks, with pipelined rendering, with pipelines
+/// compiled in the background.
 fn as_shipped() -> bool {
     let wanted = std::env::var_os("GS4D_AS_SHIPPED").is_some();
     assert!(!wanted || !cfg!(debug_assertions), "GS4D_AS_SHIPPED needs a build without debug assertions");
@@ -56,6 +58,14 @@ pub fn spawn_camera(app: &mut App, msaa: Msaa, transform: Transform) -> Entity {
     let lens = Projection::Perspective(PerspectiveProjection { fov: FOV_Y, ..default() });
     let appearance = (Tonemapping::None, DebandDither::Disabled);
     app.world_mut().spawn((Camera3d::default(), target, msaa, lens, appearance, transform)).id()
+}
+
+/// Runs frames. The app must not exit.
+pub fn run_frames(app: &mut App, frames: usize) {
+    for frame in 0..frames {
+        app.update();
+        assert!(app.should_exit().is_none(), "the app goes on in frame {frame}; the log has the reason of its end");
+    }
 }
 
 /// Returns the picture after another `seconds` seconds.

@@ -1,6 +1,7 @@
 //! Packages that are split into parts, changed and written again.
 //!
-//! In: the bytes of a package. Out: the header as text and the bodies of the sections; and a package of these parts with a valid checksum.
+//! In: the bytes of a package. Out: the header as text and the bodies of the sections; and a package of these parts
+//! with a valid checksum.
 
 use bevy_gs4d::codec::package::{MAGIC, VERSION};
 

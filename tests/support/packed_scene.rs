@@ -1,8 +1,9 @@
 //! Scenes for tests of the packed form.
 //!
-//! In: a number of Gaussians, degrees of their harmonics. Out: a scene to pack, settings for packing, a view for comparisons.
+//! In: a number of Gaussians, degrees of their harmonics. Out: a scene to pack, settings for packing, a view for
+//! comparisons.
 
-use bevy_gs4d::offline::quantize::{CompressSettings, Quality};
+use bevy_gs4d::offline::compress::{CompressSettings, Quality};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{RuntimeScene, TemporalFilter};
 use bevy_gs4d::view::{Background, Camera, RasterFov, View};
@@ -11,7 +12,8 @@ use glam::{UVec2, Vec3};
 /// A black background.
 pub const BLACK: Background = Background::Color([0.0; 3]);
 
-/// Returns a synthetic scene with a support filter of nine segments. Every 17th Gaussian is at rest and active at all times.
+/// Returns a synthetic scene with a support filter of nine segments. Every 17th Gaussian is at rest and active at all
+/// times.
 pub fn scene(count: usize, degree: u32, degree_t: u32) -> RuntimeScene {
     let settings = SynthSettings { count, degree, degree_t, ..SynthSettings::default() };
     let mut scene = synthesize(&settings).into_runtime().expect("synthetic scenes are valid");

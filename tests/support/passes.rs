@@ -1,6 +1,7 @@
 //! Single passes, on a device without a renderer.
 //!
-//! In: the name of a pass, and buffers by their names in its shader. Out: the contents of these buffers after a dispatch.
+//! In: the name of a pass, and buffers by their names in its shader. Out: the contents of these buffers after a
+//! dispatch.
 
 use super::composed::compose;
 use crate::support::no_gpu::no_gpu;
@@ -64,7 +65,8 @@ impl Gpu {
         bytes.chunks_exact(size_of::<T>()).map(bytemuck::pod_read_unaligned).collect()
     }
 
-    /// Compiles every entry point of a pass. The bindings, all of which are buffers, are those that naga finds in the shader.
+    /// Compiles every entry point of a pass. The bindings, all of which are buffers, are those that naga finds in the
+    /// shader.
     pub fn pass(&self, name: &str) -> Pass<'_> {
         let device = &self.0.device;
         let module = compose(name, &[]).expect("the pass composes");

@@ -1,6 +1,7 @@
 //! Apps without a renderer, in which captures play and every playback event is recorded.
 //!
-//! In: captures of a given duration with key-frames, time steps. Out: the playback components, and events in [`event_log`].
+//! In: captures of a given duration with key-frames, time steps. Out: the playback components, and events in
+//! [`event_log`].
 //!
 //! [`event_log`]: super::event_log
 

@@ -1,7 +1,7 @@
 //! Checkpoints for tests: pickles joined from fragments, and the zip archive around them.
 //!
-//! In: slots as pickle fragments, storages as values. Out: the bytes of a `.pth` file. Fragments do not use the memo, so they can be
-//! joined in any order.
+//! In: slots as pickle fragments, storages as values. Out: the bytes of a `.pth` file. Fragments do not use the memo,
+//! so they can be joined in any order.
 
 use std::io::{Cursor, Write};
 use zip::write::SimpleFileOptions;
@@ -20,8 +20,8 @@ pub struct Pth {
 }
 
 impl Pth {
-    /// Returns a checkpoint of `count` Gaussians of a `rot_4d` model with `k` coefficients per channel, degrees 3 and
-    /// 2.
+    /// Returns a checkpoint of `count` Gaussians of a `rot_4d` model with `k` coefficients per channel, degrees 3
+    /// and 2.
     pub fn rotating(count: usize, k: usize) -> Self {
         let mut pth = Self { slots: vec![NONE.to_vec(); 19], storages: Vec::new() };
         // Statistics and optimizer state have no storage here: reading them fails.
@@ -52,7 +52,7 @@ impl Pth {
         pth
     }
 
-    /// Puts a contiguous tensor into a slot.
+    /// Sets a slot to a contiguous tensor with its own storage.
     pub fn set(&mut self, slot: usize, size: &[usize], values: Vec<f32>) {
         let stride: Vec<usize> = (1..=size.len()).map(|axis| size[axis..].iter().product()).collect();
         self.slots[slot] = tensor(self.storages.len(), values.len(), 0, size, &stride);
@@ -122,7 +122,8 @@ pub fn tuple(items: &[Vec<u8>]) -> Vec<u8> {
     [&b"("[..], &items.concat()[..], b"t"].concat()
 }
 
-/// Returns the fragment of a tensor as torch writes it: a view of the storage `key`, which declares a length of `count` values.
+/// Returns the fragment of a tensor as torch writes it: a view of the storage `key`, which declares a length of `count`
+/// values.
 pub fn tensor(key: usize, count: usize, offset: usize, size: &[usize], stride: &[usize]) -> Vec<u8> {
     let ints = |values: &[usize]| tuple(&values.iter().map(|&value| int(value)).collect::<Vec<_>>());
     let class = b"ctorch\nFloatStorage\n".to_vec();

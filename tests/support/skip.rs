@@ -1,7 +1,8 @@
 //! Reports of skipped tests.
 //!
-//! In: the reason. Out: one line, `skipped: NAME: reason`, on standard error and, if `GS4D_SKIPPED` names a file, at the end of that file.
-//! The test harness captures the output of the print macros, but not this line. `.ci/run` counts the lines of the file.
+//! In: the reason. Out: one line, `skipped: NAME: reason`, on standard error and, if `GS4D_SKIPPED` names a file, at
+//! the end of that file. The test harness captures the output of the print macros, but not this line. `.ci/run` counts
+//! the lines of the file.
 
 use std::fmt::Display;
 use std::fs::OpenOptions;

@@ -11,8 +11,9 @@ pub fn depth_texture(context: &GpuContext, size: UVec2, value: f32) -> wgpu::Tex
     uniform_depth(&context.device, &context.queue, size, value)
 }
 
-/// Returns a multisampled depth texture, and the index of its middle column. The depth is `near / distance` left of the middle and 0 right of
-/// it; in the middle column half of the samples are covered. `slant` shifts the edge, in picture widths over the picture height.
+/// Returns a multisampled depth texture, and the index of its middle column. The depth is `near / distance` left of the
+/// middle and 0 right of it; in the middle column half of the samples are covered. `slant` shifts the edge, in picture
+/// widths over the picture height.
 pub fn edge(context: &GpuContext, size: UVec2, near: f32, distance: f32, slant: f32) -> (wgpu::Texture, u32) {
     let GpuContext { device, queue, .. } = context;
     let texture = depth_target(device, size, 4);

@@ -1,7 +1,7 @@
 //! Scenes of thin and of huge Gaussians, and the pictures in which they are difficult.
 //!
-//! In: a seed. Out: slivers (two long axes) and needles (one long axis) in random directions, Gaussians with variances near the limits of
-//! single precision, and views of wide and of small pictures.
+//! In: a seed. Out: slivers (two long axes) and needles (one long axis) in random directions, Gaussians with variances
+//! near the limits of single precision, and views of wide and of small pictures.
 
 use crate::support::blob::blob;
 use crate::support::random::Random;

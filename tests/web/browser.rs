@@ -5,7 +5,8 @@
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 
-/// WebGPU by the software driver of Chromium. Without `--use-vulkan` canvases stay black; `--no-sandbox` is needed by root.
+/// WebGPU by the software driver of Chromium. Without `--use-vulkan` canvases stay black; `--no-sandbox` is needed by
+/// root.
 const OPTIONS: [&str; 9] = [
     "--headless",
     "--no-sandbox",

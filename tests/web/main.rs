@@ -1,8 +1,9 @@
 //! The players of `examples/web` in a browser.
 //!
-//! In: the folder that `.ci/web` has built, which `GS4D_WEB` names, and Chromium. Out: one test binary. A browser without a window, which draws with a
-//! software driver, opens `page.js`, which opens players in frames, uses them as people and pages do, and reports what it has seen; the tests check the
-//! report. Skipped without the folder and without Chromium.
+//! In: the folder that `.ci/web` has built, which `GS4D_WEB` names, and Chromium. Out: one test binary. A browser
+//! without a window, which draws with a software driver, opens `page.js`, which opens players in frames, uses them as
+//! people and pages do, and reports what it has seen; the tests check the report. Skipped without the folder and
+//! without Chromium.
 
 mod browser;
 mod people;
@@ -47,7 +48,8 @@ impl Seen {
     }
 }
 
-/// Returns what a browser has seen: it runs once for all tests, which all fail if it does. `None` if this machine has none, or no page is built.
+/// Returns what the browser has reported. The browser runs once for all tests; if it fails, all tests fail. `None`
+/// without Chromium or a built page.
 fn seen() -> Option<&'static Seen> {
     static SEEN: OnceLock<Option<Result<Seen, String>>> = OnceLock::new();
     let seen = SEEN.get_or_init(|| {
@@ -143,7 +145,8 @@ fn the_limits_that_every_device_has_are_enough() {
     assert!(limits["pictured"].as_bool() == Some(true), "the bundled capture is shown: {limits}");
 }
 
-/// Returns the number of running threads for each core, at least 1: so many times as long does each thread take.
+/// Returns the number of running threads per core, at least 1: the factor by which a thread is slower than on an idle
+/// machine.
 fn busy() -> f64 {
     let cores = std::thread::available_parallelism().map_or(1.0, |cores| cores.get() as f64);
     let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
@@ -224,7 +227,7 @@ fn a_broken_file_is_refused_with_a_message_and_the_capture_stays() {
 }
 
 #[test]
-fn a_browser_without_webgpu_is_told_so() {
+fn a_browser_without_webgpu_shows_a_message() {
     check_all("missing");
 }
 

@@ -1,7 +1,9 @@
-//! People at the page: keyboard alone, a phone, forced colors, another page around, slow devices, broken files.
+//! Use of the page by people: with a keyboard alone, on a phone, in forced colors, inside another page, on slow
+//! devices, with broken files.
 //!
-//! In: the built page, Chromium, Node.js, and the programs of npm that `GS4D_WEB_TOOLS` names (`examples/web/package.json`). Out: groups of checks that
-//! `people.mjs` has made, each true or what was found instead.
+//! In: the built page, Chromium, Node.js, and the programs of npm that `GS4D_WEB_TOOLS` names
+//! (`examples/web/package.json`). Out: groups of checks that `people.mjs` has made, each true or what was found
+//! instead.
 
 use crate::support::skip::skip;
 use crate::{browser, busy};
@@ -13,7 +15,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-/// Returns what people have found: they run once for all tests, which all fail if they do. `None` if this machine has not what they need.
+/// Returns the results of `people.mjs`, which runs once for all tests; if it fails, all tests fail. `None` if this
+/// machine lacks one of its inputs.
 fn found() -> Option<&'static Value> {
     static FOUND: OnceLock<Result<Result<Value, String>, &str>> = OnceLock::new();
     let found = FOUND.get_or_init(|| {
@@ -95,7 +98,7 @@ fn the_page_around_keeps_its_wheel_and_gets_errors_and_times() {
 }
 
 #[test]
-fn a_slow_device_plays_small_and_rests_sharp() {
+fn a_slow_device_plays_at_low_resolution_and_rests_at_full_resolution() {
     check("waiting", 5);
     if let Some(found) = found() {
         println!("{}", found["figures"]);

@@ -1,7 +1,7 @@
 //! The server of the pages.
 //!
-//! In: the folder of the built page, the pictures that are wanted, a large capture, a function that opens an address in a browser. Out: what the page has
-//! posted, by name, once it has posted `end`; a message if it fails.
+//! In: the folder of the built page, the pictures that are wanted, a large capture, a function that opens an address in
+//! a browser. Out: what the page has posted, by name, once it has posted `end`; a message if it fails.
 
 use crate::browser::Browser;
 use crate::shots::{Shot, listed};

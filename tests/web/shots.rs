@@ -1,7 +1,7 @@
 //! The pictures that a browser is asked for.
 //!
-//! In: the golden scenes and the bundled capture. Out: [`Shot`]s, each with the file of its capture, a camera in the numbers of the page, and the
-//! picture of the CPU reference.
+//! In: the golden scenes and the bundled capture. Out: [`Shot`]s, each with the file of its capture, a camera in the
+//! numbers of the page, and the picture of the CPU reference.
 
 use crate::support::golden::all_views;
 use bevy_gs4d::codec::package::{self, WriteSettings};

@@ -1,6 +1,7 @@
 //! Faults of the graphics device, which it reports some time after they happened.
 //!
-//! In: a device. Out: [`Faults`], whose first message the page shows; and panics of the program on the console of the browser.
+//! In: a device. Out: [`Faults`], whose first message the page shows; and panics of the program on the console of the
+//! browser.
 
 use std::sync::{Arc, Mutex, PoisonError};
 use wasm_bindgen::prelude::wasm_bindgen;

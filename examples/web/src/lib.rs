@@ -1,7 +1,8 @@
-//! What the two players of a page have in common: a file that is opened in steps, and what the page is told about its capture.
+//! What the two players of a page have in common: a file that is opened in steps, and what the page is told about its
+//! capture.
 //!
-//! In: the name and the bytes of a file. Out: a scene ready to draw, and an [`About`]. The players are `src/bin/player.rs`, the renderer alone, and
-//! `src/bin/player_bevy.rs`, a Bevy app.
+//! In: the name and the bytes of a file. Out: a scene ready to draw, and an [`About`]. The players are
+//! `src/bin/player.rs`, the renderer alone, and `src/bin/player_bevy.rs`, a Bevy app.
 
 mod about;
 mod faults;

@@ -1,12 +1,10 @@
 //! A file that is opened in steps short enough for a page.
 //!
-//! In: the name of a file, then its bytes, piece by piece. Out: after some steps, a scene ready to draw; an error message for a file that cannot be read.
+//! In: the name of a file, then its bytes, piece by piece. Out: after some steps, a scene ready to draw; an error
+//! message for a file that cannot be read.
 
 use bevy_gs4d::codec::{CodecError, Loading, ReadOptions};
 use bevy_gs4d::scene::RuntimeScene;
-
-/// Bytes that a step reads, decompresses or converts: a few milliseconds on a slow machine.
-const BYTES: usize = 1 << 16;
 
 /// A file that is being opened.
 pub struct Opening(State);
@@ -29,8 +27,8 @@ impl Opening {
     /// Begins to open a file with this name and, if it is known, length.
     pub fn new(name: &str, length: usize) -> Self {
         let mut bytes = Vec::new();
-        // Memory that is not written to yet costs nothing; a file that grows is copied in a step that takes long. What has no room is refused when
-        // it has been received.
+        // Memory that is not written to yet costs nothing; a file that grows is copied in a step that takes long. What
+        // has no room is refused when it has been received.
         let _ = bytes.try_reserve_exact(length);
         Self(State::Receiving(name.to_owned(), bytes))
     }
@@ -61,8 +59,8 @@ impl Opening {
                 Ok(Step::Part)
             }
             State::Reading(mut loading) => {
-                if !loading.advance_runtime(BYTES).map_err(message)? {
-                    return Ok(Step::Scene(Box::new(loading.finish_runtime().map_err(message)?)));
+                if !loading.advance(Loading::STEP).map_err(message)? {
+                    return Ok(Step::Scene(Box::new(loading.finish().map_err(message)?)));
                 }
                 self.0 = State::Reading(loading);
                 Ok(Step::Part)

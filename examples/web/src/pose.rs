@@ -5,8 +5,9 @@
 use bevy_gs4d::view::{Camera, Lens, Optics, View};
 use glam::{Mat4, UVec2, Vec2};
 
-/// Returns the view of a camera. `pose` is the matrix from the space of the capture to that of the camera (x right, y down, z forward), column by
-/// column; `lens` the tangents of half the field of view across and down, or the focal lengths and the principal point in pixels.
+/// Returns the view of a camera. `pose` is the matrix from the space of the capture to that of the camera (x right, y
+/// down, z forward), column by column; `lens` the tangents of half the field of view across and down, or the focal
+/// lengths and the principal point in pixels.
 ///
 /// # Errors
 /// A message about other counts of numbers, or numbers that are not finite.

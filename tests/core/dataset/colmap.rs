@@ -1,16 +1,16 @@
-//! Folders, names and models as COLMAP and people write them.
+//! Folders, names and models of COLMAP, also as users arrange them.
 //!
-//! In: small models made here, with images in subfolders, without points, twice, with other names than on disk. Out: proof that no image is lost, and
-//! that what was assumed is said.
+//! In: small models made here, with images in subfolders, without points, twice, with other names than on disk. Out:
+//! proof that no image is lost, and that assumptions are noted.
 
 use super::Folder;
-use super::formats::{PINHOLE, colmap_binary, colmap_text, n3v, names, open, picture, refused};
-use bevy_gs4d::internal::offline::dataset::point_cloud::PointCloud;
+use super::formats::{PINHOLE, colmap_binary, colmap_text, n3v, names, open, picture, refused, times};
+use bevy_gs4d::internal::offline::dataset::PointCloud;
 use bevy_gs4d::offline::dataset::{CameraOptions, Dataset, Split, TrainingView};
 use glam::DVec3;
 use std::fs;
 
-/// Returns all views of both splits, by name, and what was assumed.
+/// Returns all views of both splits, sorted by name, and the notes.
 fn read(folder: &Folder, options: &CameraOptions) -> (Vec<TrainingView>, Vec<String>) {
     let splits = [Split::Train, Split::Test].map(|split| Dataset::open(folder.path(), split, options));
     let [train, test] = splits.map(|split| split.expect("a valid dataset"));
@@ -23,12 +23,8 @@ fn views(folder: &Folder) -> Vec<TrainingView> {
     read(folder, &CameraOptions::default()).0
 }
 
-fn times(views: &[TrainingView]) -> Vec<f32> {
-    views.iter().map(|view| view.time).collect()
-}
-
 #[test]
-fn images_in_subfolders_are_at_rest_unless_these_are_cameras() {
+fn images_in_subfolders_are_at_rest_unless_the_subfolders_are_cameras() {
     let folder = Folder::new();
     let images: Vec<String> =
         (0..12).map(|index| format!("{:02}/{:02}_{index:05}.png", index / 6, index / 6)).collect();
@@ -36,7 +32,7 @@ fn images_in_subfolders_are_at_rest_unless_these_are_cameras() {
     colmap_text(&folder, PINHOLE, &images);
     let (found, notes) = read(&folder, &CameraOptions::default());
     assert_eq!((found.len(), times(&found)), (12, vec![0.0; 12]), "each image is a picture of a scene at rest");
-    assert!(notes.iter().any(|note| note.contains("at rest") && note.contains("00, 01")), "it is said: {notes:?}");
+    assert!(notes.iter().any(|note| note.contains("at rest") && note.contains("00, 01")), "a note says so: {notes:?}");
 
     let frames = [("a/0001.png", 0), ("a/0002.png", 1), ("b/0001.png", 2), ("b/0002.png", 3)];
     colmap_text(&folder, PINHOLE, &frames);
@@ -49,7 +45,7 @@ fn images_in_subfolders_are_at_rest_unless_these_are_cameras() {
 }
 
 #[test]
-fn the_option_for_scenes_at_rest_reads_the_images_of_the_model_alone() {
+fn the_option_for_scenes_at_rest_reads_only_the_images_of_the_model() {
     let folder = Folder::new();
     colmap_text(&folder, PINHOLE, &[("cam0/005.png", 0), ("cam1.png", 1), ("cam2/005.png", 2)]);
     for camera in 0..3 {
@@ -59,7 +55,7 @@ fn the_option_for_scenes_at_rest_reads_the_images_of_the_model_alone() {
     }
     let (found, notes) = read(&folder, &CameraOptions::default());
     assert_eq!(found.len(), 6, "two frames of each camera");
-    assert!(notes.iter().any(|note| note.contains("do not move") && note.ends_with('3')), "it is said: {notes:?}");
+    assert!(notes.iter().any(|note| note.contains("do not move") && note.ends_with('3')), "a note says so: {notes:?}");
     let (found, _) = read(&folder, &CameraOptions { is_static: true, ..CameraOptions::default() });
     assert_eq!(names(&found), ["cam0_005", "cam1", "cam2_005"], "the images of the model");
     assert_eq!(times(&found), [0.0; 3], "at time 0");
@@ -70,7 +66,8 @@ fn every_time_is_0_with_the_option_for_scenes_at_rest() {
     let folder = Folder::new();
     let frame = |x: i32| {
         serde_json::json!({
-            "file_path": format!("f{x}"), "time": x, "transform_matrix": [[1, 0, 0, x], [0, 1, 0, 0], [0, 0, 1, 3], [0, 0, 0, 1]],
+            "file_path": format!("f{x}"), "time": x,
+            "transform_matrix": [[1, 0, 0, x], [0, 1, 0, 0], [0, 0, 1, 3], [0, 0, 0, 1]],
         })
     };
     let json = serde_json::json!({ "camera_angle_x": 0.8, "w": 8, "h": 8, "frames": [frame(2), frame(3), frame(4)] });
@@ -92,7 +89,7 @@ fn images_txt(folder: &Folder, images: &[(&str, usize)], points: &str) {
 }
 
 #[test]
-fn images_txt_has_all_its_images_with_any_second_lines() {
+fn images_txt_is_read_with_any_form_of_second_lines() {
     let images: Vec<String> = (0..12).map(|index| format!("i {index:02}.png")).collect();
     let images: Vec<(&str, usize)> = images.iter().map(String::as_str).zip(0..).collect();
     let folder = Folder::new();
@@ -122,7 +119,7 @@ fn images_that_are_in_a_model_twice_are_used_once_or_refused() {
         write(&[("a.png", 0), ("b.png", 1), (r".\a.png", 0)]);
         let (found, notes) = read(folder, &CameraOptions::default());
         assert_eq!(names(&found), ["a", "b"], "the same pose: once");
-        assert!(notes.iter().any(|note| note.contains("twice") && note.contains("a.png")), "it is said: {notes:?}");
+        assert!(notes.iter().any(|note| note.contains("twice") && note.contains("a.png")), "a note says so: {notes:?}");
         write(&[("a.png", 0), ("b.png", 1), ("a.png", 2)]);
         refused(folder, "image a.png is in it twice");
     }
@@ -149,7 +146,7 @@ fn the_model_with_the_most_images_is_read() {
     colmap_text(&folder, PINHOLE, &images[..2]);
     let (found, notes) = read(&folder, &CameraOptions::default());
     assert_eq!(found.len(), 5, "five images are more than two");
-    assert!(notes[0].contains("most images, 5") && notes[0].contains("has 2"), "it is said: {notes:?}");
+    assert!(notes[0].contains("most images, 5") && notes[0].contains("has 2"), "a note says so: {notes:?}");
     colmap_binary(&folder, &[images[0], images[1], images[2], images[3], images[4], ("f.png", 5)]);
     assert_eq!(views(&folder).len(), 6, "the binary model in sparse/0");
     let below = Folder::new();
@@ -170,7 +167,7 @@ fn names_with_backslashes_are_paths() {
     }
     let dataset = open(&folder, Split::Train);
     dataset.require_images().expect("the images are on disk");
-    assert_eq!(names(&dataset.views), ["a_i01"], "the name of a view has neither");
+    assert_eq!(names(&dataset.views), ["a_i01"], "the name of a view has neither backslashes nor a leading dot");
 }
 
 #[cfg(target_os = "linux")]
@@ -188,18 +185,18 @@ fn images_are_found_by_names_of_another_case_extension_or_encoding() {
         picture(&folder, &format!("images/{name}"), [1, 2, 3]);
     }
     let (found, notes) = read(&folder, &CameraOptions::default());
-    assert_eq!(found.len(), 3, "a byte order mark is no part of the first line");
+    assert_eq!(found.len(), 3, "a byte order mark is not part of the first line");
     for view in &found {
         view.load_covered().expect("the image is on disk");
     }
-    assert!(notes.iter().any(|note| note.starts_with("2 files have other names")), "it is said: {notes:?}");
+    assert!(notes.iter().any(|note| note.starts_with("2 files have other names")), "a note says so: {notes:?}");
     fs::remove_file(folder.path().join("images/C.PNG")).expect("the image is there");
     let error = open(&folder, Split::Test).require_images().expect_err("an image is missing").to_string();
     assert!(error.contains("c.png"), "the name in the model: {error}");
 }
 
 #[test]
-fn files_of_systems_are_no_frames() {
+fn hidden_files_of_operating_systems_are_not_frames() {
     let folder = Folder::new();
     n3v(&folder, 3);
     for camera in 0..3 {
@@ -222,7 +219,7 @@ fn files_of_systems_are_no_frames() {
 }
 
 #[test]
-fn cameras_and_points_far_from_0_are_counted_from_one_origin() {
+fn cameras_and_points_far_from_0_are_relative_to_one_origin() {
     let folder = Folder::new();
     colmap_text(&folder, PINHOLE, &[]);
     let place = |index: i32| DVec3::new(500_000.0 + 3.0 * f64::from(index), 5_400_000.0, 300.0);
@@ -234,7 +231,7 @@ fn cameras_and_points_far_from_0_are_counted_from_one_origin() {
     folder.write("sparse/0/points3D.txt", "1 500001.5 5400000.25 304.5 10 20 30 0.5\n");
     let dataset = open(&folder, Split::Train);
     let origin = DVec3::from(dataset.origin.place);
-    assert!(dataset.notes.iter().any(|note| note.contains("far from 0")), "it is said: {:?}", dataset.notes);
+    assert!(dataset.notes.iter().any(|note| note.contains("far from 0")), "a note says so: {:?}", dataset.notes);
     for view in &dataset.views {
         let index = view.name[1..].parse().expect("the number of the camera");
         let found = view.camera.world_to_camera.inverse().w_axis.truncate().as_dvec3() + origin;
@@ -258,11 +255,11 @@ fn a_folder_named_lego_has_its_own_test_views_without_a_file_of_the_third_split(
     assert_eq!((test().split, test().notes.len()), (Split::Test, 0), "the test split");
     folder.write("lego/transforms_val.json", &json);
     assert_eq!(test().split, Split::Val, "the third split, as in the original");
-    assert!(test().notes[0].contains("transforms_val.json"), "it is said: {:?}", test().notes);
+    assert!(test().notes[0].contains("transforms_val.json"), "a note says so: {:?}", test().notes);
 }
 
 #[test]
-fn poses_column_by_column_are_those_row_by_row() {
+fn poses_in_fortran_order_equal_poses_in_c_order() {
     let folder = Folder::new();
     n3v(&folder, 3);
     for camera in 0..3 {
@@ -279,7 +276,7 @@ fn poses_column_by_column_are_those_row_by_row() {
 }
 
 #[test]
-fn damaged_frames_of_a_video_say_what_to_delete() {
+fn errors_of_damaged_frames_of_a_video_say_what_to_delete() {
     let folder = Folder::new();
     let data = folder.path().join("data");
     let inside = Folder::new();

@@ -1,10 +1,11 @@
 //! Datasets of nerfstudio, COLMAP and N3V.
 //!
-//! In: small folders made here, of a rig of cameras whose projections are computed here with sines and cosines. Out: proof that every reader projects
-//! known points to the same pixels, and of splits, times, masks, distortion and wrong folders.
+//! In: small folders made here, of a rig of cameras whose projections are computed here with sines and cosines. Out:
+//! proof that every reader projects known points to the same pixels, and of splits, times, masks, distortion and wrong
+//! folders.
 
 use super::{Folder, with};
-use bevy_gs4d::internal::offline::dataset::point_cloud::{CloudPoint, PointCloud};
+use bevy_gs4d::internal::offline::dataset::{CloudPoint, PointCloud};
 use bevy_gs4d::offline::dataset::{CameraOptions, Dataset, Split, TrainingView};
 use bevy_gs4d::scene::Origin;
 use bevy_gs4d::view::Lens;
@@ -19,7 +20,8 @@ const CENTER: [f64; 2] = [19.0, 16.0];
 /// A point in front of all cameras.
 const POINT: [f64; 3] = [0.3, -0.2, 0.4];
 
-/// A camera on a circle of radius 5 in the plane y = 0.5, that looks towards the axis, horizontally: right, down and forward in the world, position.
+/// A camera on a circle of radius 5 in the plane y = 0.5, that looks towards the axis, horizontally: right, down and
+/// forward in the world, position.
 struct Rig {
     right: [f64; 3],
     down: [f64; 3],
@@ -97,6 +99,10 @@ pub(super) fn names(views: &[TrainingView]) -> Vec<&str> {
     views.iter().map(|view| view.name.as_str()).collect()
 }
 
+pub(super) fn times(views: &[TrainingView]) -> Vec<f32> {
+    views.iter().map(|view| view.time).collect()
+}
+
 pub(super) fn picture(folder: &Folder, name: &str, color: [u8; 3]) {
     let path = folder.path().join(name);
     std::fs::create_dir_all(path.parent().expect("a folder")).expect("the folder can be made");
@@ -104,9 +110,13 @@ pub(super) fn picture(folder: &Folder, name: &str, color: [u8; 3]) {
 }
 
 pub(super) fn nerfstudio(cameras: usize) -> Value {
-    let frame = |index| json!({ "file_path": format!("images/f{index:02}.png"), "transform_matrix": Rig::new(index).to_world() });
+    let frame = |index| {
+        let file = format!("images/f{index:02}.png");
+        json!({ "file_path": file, "transform_matrix": Rig::new(index).to_world() })
+    };
     json!({
-        "camera_model": "OPENCV", "w": WIDTH, "h": HEIGHT, "fl_x": FOCAL[0], "fl_y": FOCAL[1], "cx": CENTER[0], "cy": CENTER[1],
+        "camera_model": "OPENCV", "w": WIDTH, "h": HEIGHT, "fl_x": FOCAL[0], "fl_y": FOCAL[1],
+        "cx": CENTER[0], "cy": CENTER[1],
         "ply_file_path": "points.ply", "frames": (0..cameras).map(frame).collect::<Vec<_>>(),
     })
 }
@@ -140,7 +150,7 @@ fn refused_split(folder: &Folder) {
 }
 
 #[test]
-fn the_first_number_of_frames_without_times_is_time_0() {
+fn without_times_the_first_frame_number_is_time_0() {
     let folder = Folder::new();
     let mut json = nerfstudio(4);
     for index in 0..4 {
@@ -305,7 +315,8 @@ fn colmap_models_project_points_as_their_cameras_do() {
 fn points_ply(encoding: &str, color: &str, rows: &[u8]) -> Vec<u8> {
     let colors = ["red", "green", "blue"].map(|name| format!("property {color} {name}\n")).concat();
     let header = format!(
-        "ply\nformat {encoding} 1.0\nelement vertex 2\nproperty float x\nproperty double y\nproperty float z\n{colors}property float time\nend_header\n"
+        "ply\nformat {encoding} 1.0\nelement vertex 2\nproperty float x\nproperty double y\nproperty float z\n\
+         {colors}property float time\nend_header\n"
     );
     [header.as_bytes(), rows].concat()
 }
@@ -409,7 +420,7 @@ fn colmap_models_that_cannot_be_used_are_refused_by_name() {
     colmap_text(&folder, PINHOLE, &[("a.png", 0)]);
     refused(&folder, "one view");
     colmap_text(&folder, PINHOLE, &[("./a1.png", 0), ("./b2.png", 1)]);
-    assert_eq!(open(&folder, Split::Train).views[0].time, 0.0, "images of one folder are no frames of a camera");
+    assert_eq!(open(&folder, Split::Train).views[0].time, 0.0, "images of one folder are not frames of a camera");
     colmap_text(&folder, PINHOLE, &[("../a.png", 0), ("b.png", 1)]);
     refused(&folder, "../a.png");
     let binary = Folder::new();
@@ -499,7 +510,7 @@ fn paths_with_control_characters_are_refused() {
 }
 
 #[test]
-fn cameras_may_have_sizes_of_their_own_and_images_may_not() {
+fn frames_may_have_their_own_sizes_and_images_must_match_them() {
     let folder = Folder::new();
     let mut json = nerfstudio(3);
     json["frames"][2]["w"] = json!(2 * WIDTH);

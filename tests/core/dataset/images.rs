@@ -1,14 +1,14 @@
 //! Images of datasets.
 //!
-//! In: small images written to temporary folders. Out: proof that their values match numpy and Pillow, and that
-//! missing and damaged images are named.
+//! In: small images written to temporary folders. Out: proof that their values match numpy and Pillow, and that missing
+//! and damaged images are named.
 
 use std::fs;
 
-use bevy_gs4d::offline::PictureError;
 use bevy_gs4d::offline::dataset::{
     CameraFile, CameraOptions, CoveredImage, Dataset, DatasetError, MAX_SIDE, Split, TrainingView,
 };
+use bevy_gs4d::offline::picture_file::PictureError;
 use bevy_gs4d::view::Camera;
 use glam::{UVec2, Vec3};
 use image::{GrayImage, Rgba32FImage, RgbaImage};
@@ -182,7 +182,8 @@ fn view_of(folder: &Folder, image: &str, size: u32) -> TrainingView {
 #[test]
 fn linear_light_of_exr_images_becomes_srgb_colors() {
     let folder = Folder::new();
-    // Linear light multiplied by alpha: one half; one half behind a coverage of one half; more than white; a negative value and no number.
+    // Linear light multiplied by alpha: one half; one half behind a coverage of one half; brighter than white; a
+    // negative value and NaN.
     let texels = [[0.5, 0.5, 0.5, 1.0], [0.25, 0.25, 0.25, 0.5], [4.0, 1.0, 0.0, 1.0], [-1.0, f32::NAN, 0.002, 1.0]];
     let image = Rgba32FImage::from_raw(2, 2, texels.concat()).expect("four texels");
     image.save(folder.path().join("a.exr")).expect("the folder can be written to");

@@ -1,12 +1,13 @@
 //! Datasets that other programs have written.
 //!
-//! In: `tests/golden/datasets/`: COLMAP models by pycolmap, others by NumPy, and what pycolmap and OpenCV find in them. Its `make.py` describes them.
-//! Out: proof that every reader finds the same poses, sizes, times and points, and undoes every distortion as they do.
+//! In: `tests/golden/datasets/`: COLMAP models by pycolmap, others by NumPy, and what pycolmap and OpenCV find in them.
+//! Its `make.py` describes them. Out: proof that every reader finds the same poses, sizes, times and points, and undoes
+//! every distortion as they do.
 //!
-//! A point of the world lies behind the middle of a pixel of the pinhole camera. The images are stripes, from which follows where that pixel was
-//! sampled in the distorted image: there the other program sees the point.
+//! A point of the world lies behind the middle of a pixel of the pinhole camera. The images are stripes, from which
+//! follows where that pixel was sampled in the distorted image: there the other program sees the point.
 
-use bevy_gs4d::internal::offline::dataset::point_cloud::{CloudPoint, PointCloud};
+use bevy_gs4d::internal::offline::dataset::{CloudPoint, PointCloud};
 use bevy_gs4d::offline::dataset::{CameraOptions, CoveredImage, Dataset, Split, TrainingView};
 use bevy_gs4d::scene::Origin;
 use bevy_gs4d::view::Lens;
@@ -116,14 +117,15 @@ fn check_view(view: &TrainingView, expected: &ExpectedView) {
 fn check_source(name: &str, image: &CoveredImage, pixel: UVec2, distorted: DVec2) {
     let [red, green, blue, _] = image.texels[(pixel.y * image.size.x + pixel.x) as usize].map(f64::from);
     let DVec2 { x, y } = distorted - 0.5;
-    // Columns and rows of even numbers have 28, the others 228.
+    // Even columns and rows have the value 28, odd ones 228.
     let stripe = |at: f64| 28.0 + 200.0 * (1.0 - (at.rem_euclid(2.0) - 1.0).abs());
     let close = |found: f64, expected: f64| (found - expected).abs() <= 200.0 * PIXELS + 0.5;
     let is_there =
         close(red, stripe(x)) && close(green, stripe(y)) && (blue - (3.0 * x + 2.0 * y)).abs() <= 5.0 * PIXELS + 0.5;
     assert!(
         is_there,
-        "{name}: pixel {pixel} is sampled at {distorted}, so that its color is about {} {} {}, not {red} {green} {blue}",
+        "{name}: pixel {pixel} is sampled at {distorted}, so that its color is about {} {} {}, \
+         not {red} {green} {blue}",
         stripe(x),
         stripe(y),
         3.0 * x + 2.0 * y
@@ -175,7 +177,7 @@ fn colmap_points_are_those_of_pycolmap() {
 }
 
 #[test]
-fn nerfstudio_cameras_project_and_are_undistorted_as_by_opencv() {
+fn nerfstudio_cameras_project_and_are_undistorted_as_in_opencv() {
     for name in ["nerfstudio_opencv", "nerfstudio_fisheye"] {
         let Expected { views, .. } = expected(name);
         assert_eq!(views.iter().filter(|view| view.undistorted.is_some()).count(), 1, "{name}: a smooth image");
@@ -184,7 +186,7 @@ fn nerfstudio_cameras_project_and_are_undistorted_as_by_opencv() {
 }
 
 #[test]
-fn n3v_cameras_project_as_by_the_loader_of_llff() {
+fn n3v_cameras_project_as_in_the_loader_of_llff() {
     let Expected { views, .. } = expected("n3v");
     assert_eq!(views.len(), 6, "two frames of three cameras");
     check("n3v", &views);

@@ -1,19 +1,34 @@
 //! Datasets.
 //!
 //! In: small camera files and images written to temporary folders; with `GS4D_DATA` set, trained captures. Out: proof
-//! that cameras in every form and their sizes are read as in the original; images, invalid files and trained captures
-//! are tested in [`images`], [`wrong`] and [`captures`], datasets of other formats in [`formats`], COLMAP's folders, names and models in [`colmap`],
-//! what other programs have written and measured in [`independent`], their ways to write camera files in [`variants`], and datasets far from 0 in
-//! [`origins`].
+//! that cameras in every form and their sizes are read as in the original. The modules test images ([`images`]),
+//! invalid files ([`wrong`]), trained captures ([`captures`]), other formats ([`formats`]), folders, names and models
+//! of COLMAP ([`colmap`]), datasets written by other programs ([`independent`]), variants of camera files
+//! ([`variants`]) and datasets far from 0 ([`origins`]);
+//! and the formats of Nerfies ([`nerfies`]), Technicolor ([`technicolor`]), LLFF ([`llff`]) and Google Immersive
+//! ([`immersive`]), with cameras that look at the origin ([`looking`]); of `PanopticSports` ([`panoptic`]), `EasyVolcap`
+//! ([`easyvolcap`]) and `ZJU-MoCap` ([`zju`]); of Pose2Sim and Qualisys ([`pose2sim`]), of scans of telephones
+//! ([`telephones`]), and matrices of lenses ([`matrices`]).
 
 mod captures;
 mod colmap;
+mod easyvolcap;
 mod formats;
 mod images;
+mod immersive;
 mod independent;
+mod llff;
+mod looking;
+mod matrices;
+mod nerfies;
 mod origins;
+mod panoptic;
+mod pose2sim;
+mod technicolor;
+mod telephones;
 mod variants;
 mod wrong;
+mod zju;
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,11 +1,12 @@
 //! Datasets far from 0: coordinates of maps, and seconds since 1970.
 //!
-//! In: small datasets made here, of cameras on a circle around a place of a map. Out: proof that the views and points of all splits are counted from one
-//! origin without a loss of digits, that it can be given, and that datasets near 0 have none.
+//! In: small datasets made here, of cameras on a circle around a place of a map. Out: proof that the views and points
+//! of all splits are relative to one origin without a loss of digits, that the origin can be given, and that datasets
+//! near 0 have none.
 
 use super::Folder;
-use super::formats::{PINHOLE, nerfstudio, open};
-use bevy_gs4d::internal::offline::dataset::point_cloud::PointCloud;
+use super::formats::{PINHOLE, nerfstudio, open, times};
+use bevy_gs4d::internal::offline::dataset::PointCloud;
 use bevy_gs4d::offline::dataset::{CameraOptions, Dataset, Split, TrainingView};
 use bevy_gs4d::scene::Origin;
 use glam::{DMat4, DQuat, DVec3};
@@ -30,7 +31,7 @@ fn to_world(index: usize) -> DMat4 {
     DMat4::from_cols(right.extend(0.0), down.extend(0.0), forward.extend(0.0), place(index).extend(1.0))
 }
 
-/// Returns the place of a view from its origin.
+/// Returns the camera position of a view, relative to the origin of its dataset.
 fn center(view: &TrainingView) -> DVec3 {
     view.camera.world_to_camera.inverse().w_axis.truncate().as_dvec3()
 }
@@ -62,18 +63,15 @@ fn blender(folder: &Folder, split: Split, cameras: std::ops::Range<usize>) {
     let frame = |index: usize| {
         let flipped = to_world(index) * DMat4::from_scale(DVec3::new(1.0, -1.0, -1.0));
         let rows = flipped.transpose().to_cols_array_2d();
-        json!({ "file_path": format!("i{index:02}"), "transform_matrix": rows, "time": EPOCH + 0.25 * (index + 1) as f64 })
+        let time = EPOCH + 0.25 * (index + 1) as f64;
+        json!({ "file_path": format!("i{index:02}"), "transform_matrix": rows, "time": time })
     };
     let frames: Vec<Value> = cameras.map(frame).collect();
     folder.write_json(split.file_name(), &json!({ "camera_angle_x": 0.7, "w": 40, "h": 30, "frames": frames }));
 }
 
-fn times(views: &[TrainingView]) -> Vec<f32> {
-    views.iter().map(|view| view.time).collect()
-}
-
 #[test]
-fn cameras_on_a_map_are_counted_from_a_place_among_them() {
+fn cameras_on_a_map_have_an_origin_among_them() {
     let folder = Folder::new();
     colmap(&folder);
     let (train, test) = (open(&folder, Split::Train), open(&folder, Split::Test));

@@ -1,7 +1,8 @@
 //! Camera files as other programs write them.
 //!
-//! In: a small nerfstudio or Blender folder, with a byte order mark, numbers that are none, paths of Windows, names without extension, matrices of
-//! other forms and scales, frames without times. Out: proof that each is read as it is meant, or refused by name.
+//! In: a small nerfstudio or Blender folder, with a byte order mark, NaN and infinities, paths of Windows, names
+//! without extension, matrices of other forms and scales, frames without times. Out: proof that each is read as it is
+//! meant, or refused by name.
 
 use super::Folder;
 use super::formats::{names, nerfstudio, open, picture, refused};
@@ -52,7 +53,7 @@ fn a_byte_order_mark_is_skipped_and_other_encodings_are_named() {
 }
 
 #[test]
-fn numbers_that_are_none_are_refused_where_they_are_needed() {
+fn nan_and_infinity_are_refused_where_numbers_are_needed() {
     let folder = Folder::new();
     let whole = serde_json::to_string_pretty(&nerfstudio(3)).expect("JSON");
     folder.write(
@@ -93,11 +94,11 @@ fn paths_of_windows_lead_to_their_files() {
     train.require_images().expect("the images and the mask are found");
     assert_eq!(train.views[0].mask, Some(folder.path().join("masks/f01.png")), "the mask");
     assert_eq!(train.points, Some(folder.path().join("points/first.ply")), "the file of points");
-    assert!(train.notes.is_empty(), "a path of Windows needs no word: {:?}", train.notes);
+    assert!(train.notes.is_empty(), "paths of Windows need no note: {:?}", train.notes);
 }
 
 #[test]
-fn names_without_extension_are_those_of_any_image() {
+fn a_name_without_extension_is_found_with_any_image_extension() {
     let mut json = nerfstudio(3);
     for name in ["w", "h"] {
         json.as_object_mut().expect("an object").remove(name);
@@ -127,7 +128,7 @@ fn names_without_extension_are_those_of_any_image() {
 }
 
 #[test]
-fn matrices_of_three_rows_and_flat_ones_are_those_of_four_rows() {
+fn matrices_of_three_rows_and_flat_matrices_equal_those_of_four_rows() {
     let expected = views(&nerfstudio(4));
     let rows = |matrix: &Value, count: usize| matrix.as_array().expect("rows")[..count].to_vec();
     let flat = |rows: Vec<Value>| {
@@ -217,7 +218,7 @@ fn matrices_that_mirror_or_shear_are_refused() {
 }
 
 #[test]
-fn a_scale_that_all_matrices_have_is_undone_and_said() {
+fn a_scale_shared_by_all_matrices_is_undone_and_noted() {
     let expected = views(&nerfstudio(4));
     for factor in [40.0, 0.025] {
         let folder = folder_of(&changed(nerfstudio(4), |_, matrix| scaled(matrix, [factor; 3])));
@@ -226,7 +227,7 @@ fn a_scale_that_all_matrices_have_is_undone_and_said() {
             let (pose, expected) = (view.camera.world_to_camera, expected.camera.world_to_camera);
             assert!(pose.abs_diff_eq(expected, 1e-5), "{}: the pose without the scale: {pose}", view.name);
         }
-        assert!(found.notes.iter().any(|note| note.contains("scale")), "it is said: {:?}", found.notes);
+        assert!(found.notes.iter().any(|note| note.contains("scale")), "a note says so: {:?}", found.notes);
     }
     let mixed = changed(nerfstudio(4), |index, matrix| scaled(matrix, [if index == 3 { 2.0 } else { 1.0 }; 3]));
     refused(&folder_of(&mixed), "frame 3: the axes of the camera have the length 2, and those of most cameras 1");

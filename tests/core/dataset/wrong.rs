@@ -9,6 +9,7 @@ use std::path::Path;
 use bevy_gs4d::offline::dataset::{CameraFile, CameraOptions, Dataset, DatasetError, MAX_SIDE, Split, TrainingView};
 use glam::UVec2;
 use proptest::prelude::*;
+use proptest::sample::subsequence;
 use serde_json::{Value, json};
 
 use super::{Folder, golden, identity, lens_values, load, resolution_option, transforms, with};
@@ -237,7 +238,8 @@ fn check_outcome(outcome: Result<Vec<TrainingView>, DatasetError>) -> Result<(),
                 prop_assert!(size.min_element() >= 1 && size.max_element() <= MAX_SIDE, "size {}", size);
                 prop_assert!(view.camera.world_to_camera.is_finite() && view.time.is_finite(), "{:?}", view);
                 prop_assert!(lens_values(&view).1.iter().all(|value| value.is_finite()), "{:?}", view.camera.lens);
-                prop_assert_eq!(Path::new(&view.name).file_name(), Some(OsStr::new(&view.name)));
+                let name = Path::new(&view.name).file_name();
+                prop_assert_eq!(name, Some(OsStr::new(&view.name)), "the name of a view is a plain file name");
             }
         }
         Err(error) => prop_assert!(error.to_string().contains("transforms_test.json"), "{}", error),
@@ -248,8 +250,10 @@ fn check_outcome(outcome: Result<Vec<TrainingView>, DatasetError>) -> Result<(),
 proptest! {
     #[test]
     fn random_values_anywhere_never_panic(
-        file in proptest::sample::subsequence(vec!["camera_angle_x", "w", "h", "fl_x", "fl_y", "cx", "cy", "k1", "camera_model"], 0..5),
-        entry in proptest::sample::subsequence(vec!["file_path", "transform_matrix", "time", "mask_path", "w", "fl_x", "cy", "distortion_params"], 0..3),
+        file in subsequence(vec!["camera_angle_x", "w", "h", "fl_x", "fl_y", "cx", "cy", "k1", "camera_model"], 0..5),
+        entry in subsequence(
+            vec!["file_path", "transform_matrix", "time", "mask_path", "w", "fl_x", "cy", "distortion_params"], 0..3
+        ),
         values in proptest::collection::vec(any_json(), 8),
     ) {
         let mut json = transforms();

@@ -1,11 +1,11 @@
-//! The rings: no module uses a module that lies further out, and no files use each other in a circle.
+//! The rings: no module uses a module that lies further out, and neither files nor folders use each other in a cycle.
 //!
-//! In: the text of every file in `src/`. Out: proof that no path points outwards and that no paths form a circle; a failure lists such
-//! paths with file and line.
+//! In: the text of every file in `src/`. Out: proof that no path points outwards and that no paths form a cycle; a
+//! failure lists such paths with file and line.
 //!
-//! A path is a use of the file that defines its item, behind all imports and re-exports. A `mod.rs` is treated as every other file, except
-//! that its `mod` items, and re-exports of its children that its code does not use, are not uses. Unit tests are read; comments and strings
-//! are ignored. Uses without a path, such as calls of methods, are not found.
+//! A path is a use of the file that defines its item, behind all imports and re-exports. A `mod.rs` is treated as every
+//! other file, except that its `mod` items, and re-exports of its children that its code does not use, are not uses.
+//! Unit tests are read; comments and strings are ignored. Uses without a path, such as calls of methods, are not found.
 
 mod paths;
 mod sources;
@@ -49,9 +49,15 @@ fn no_path_points_outwards() {
 }
 
 #[test]
-fn no_files_use_each_other_in_a_circle() {
+fn no_files_use_each_other_in_a_cycle() {
     let cycles = Sources::of_this_crate().cycles();
-    assert!(cycles.is_empty(), "src has {} circles:\n{}", cycles.len(), cycles.join("\n"));
+    assert!(cycles.is_empty(), "src has {} cycles:\n{}", cycles.len(), cycles.join("\n"));
+}
+
+#[test]
+fn no_folders_use_each_other_in_a_circle() {
+    let cycles = Sources::of_this_crate().folder_cycles();
+    assert!(cycles.is_empty(), "the folders of src have {} circles:\n{}", cycles.len(), cycles.join("\n"));
 }
 
 #[test]
@@ -97,13 +103,33 @@ fn outward_paths_and_cycles_are_found() {
     assert_eq!(sources.cycles(), cycles, "the files that use each other");
 }
 
-/// Returns the circles among files.
+/// Returns the cycles among files.
 fn cycles(files: &[(&str, &str)]) -> Vec<String> {
     Sources::new(files.iter().copied()).cycles()
 }
 
 #[test]
-fn a_file_and_a_mod_that_use_each_other_are_a_circle() {
+fn folders_of_one_parent_that_use_each_other_are_a_circle() {
+    let files = [
+        ("lib.rs", "mod a;"),
+        ("a/mod.rs", "mod b; mod c; mod d; use b::x::X;"),
+        ("a/b/mod.rs", "mod x;"),
+        ("a/b/x.rs", "use crate::a::c::y::Y; pub struct X;"),
+        ("a/c/mod.rs", "mod y; mod z;"),
+        ("a/c/y.rs", "pub struct Y;"),
+        ("a/c/z.rs", "use crate::a::d::W;"),
+        ("a/d.rs", "use super::b::x::X; pub struct W;"),
+    ];
+    let none = Sources::new(files).folder_cycles();
+    assert_eq!(none, [""; 0], "a file between two folders, and a parent that uses its child, are no circle of folders");
+    let back = [("a/c/z.rs", "use crate::a::b::x::X;")];
+    let found = Sources::new(files.into_iter().filter(|(file, _)| *file != "a/c/z.rs").chain(back)).folder_cycles();
+    let steps = "src/a/b/x.rs:1: crate::a::c::y::Y\nsrc/a/c/z.rs:1: crate::a::b::x::X\n";
+    assert_eq!(found, [steps], "no two files use each other, but their folders do");
+}
+
+#[test]
+fn a_file_and_a_mod_that_use_each_other_are_a_cycle() {
     let own = ("a/b.rs", "use super::LIMIT; pub struct B;");
     let found = cycles(&[("a/mod.rs", "mod b; pub use b::B;\nconst LIMIT: u8 = 1; fn f() { b::g() }"), own]);
     assert_eq!(found, ["src/a/b.rs:1: super::LIMIT\nsrc/a/mod.rs:2: b::g\n"], "mod.rs calls a function of its child");

@@ -1,7 +1,8 @@
 //! The paths in a Rust file.
 //!
-//! In: the text of the file. Out: every path of two or more names and every branch of a `use`, with its line and the module around it; the
-//! names of the items that the file defines, and the names that occur outside of `use` items. Comments, strings and doc text are skipped.
+//! In: the text of the file. Out: every path of two or more names and every branch of a `use`, with its line and the
+//! module around it; the names of the items that the file defines, and the names that occur outside of `use` items.
+//! Comments, strings and doc text are skipped.
 
 use std::collections::BTreeSet;
 
@@ -50,7 +51,8 @@ impl Mention {
         matches!(&self.kind, Kind::Import { name, .. } if name == bound)
     }
 
-    /// Returns whether the path is a `use` that binds a name for the whole file, so that other files can reach the name.
+    /// Returns whether the path is a `use` that binds a name for the whole file, so that other files can reach the
+    /// name.
     pub fn exports(&self, bound: &str) -> bool {
         self.binds(bound) && matches!(self.kind, Kind::Import { is_outermost: true, .. })
     }

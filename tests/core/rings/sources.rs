@@ -1,7 +1,7 @@
 //! The files of a crate as modules, and the uses between them.
 //!
-//! In: files with their paths below `src`. Out: the module that each path leads to, behind imports and re-exports; the paths that an order
-//! of the modules forbids; the files that use each other in a circle.
+//! In: files with their paths below `src`. Out: the module that each path leads to, behind imports and re-exports; the
+//! paths that an order of the modules forbids; the files that use each other in a cycle.
 
 use super::paths::{Kind, Mention, Module, Source};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -68,8 +68,8 @@ impl Sources {
         Some(self.find(&base, &path, MOST_REEXPORTS).unwrap_or_else(|| self.descend(&base, &path).0))
     }
 
-    /// Returns the module at which a path in the module `inside` of a file starts, and the rest of the path; `None` for a path of another
-    /// crate. An imported first name is replaced by the path of the import, at most `imports` times.
+    /// Returns the module at which a path in the module `inside` of a file starts, and the rest of the path; `None` for
+    /// a path of another crate. An imported first name is replaced by the path of the import, at most `imports` times.
     fn start(&self, file: &[String], inside: &[String], path: &[String], imports: usize) -> Option<(Module, Module)> {
         let mut base = [file, inside].concat();
         let (first, mut rest) = path.split_first()?;
@@ -111,7 +111,8 @@ impl Sources {
         (module, path)
     }
 
-    /// Returns the module that defines the item of a path, behind at most `reexports` re-exports; `None` if no file defines the item.
+    /// Returns the module that defines the item of a path, behind at most `reexports` re-exports; `None` if no file
+    /// defines the item.
     fn find(&self, base: &[String], path: &[String], reexports: usize) -> Option<Module> {
         let (module, rest) = self.descend(base, path);
         let source = self.modules.get(&module)?;
@@ -133,7 +134,8 @@ impl Sources {
         globs.find_map(behind)
     }
 
-    /// Returns the paths that are forbidden by the order of the outermost modules, or by the order inside the module `plugin`.
+    /// Returns the paths that are forbidden by the order of the outermost modules, or by the order inside the module
+    /// `plugin`.
     pub fn outward(&self, rings: &Order, plugin: &Order) -> Vec<String> {
         let mut outward = Vec::new();
         for Use { module, source, mention, target } in self.uses() {
@@ -151,30 +153,36 @@ impl Sources {
         outward
     }
 
-    /// Returns the shortest circle through each file, each circle once: its paths, one on each line.
+    /// Returns the shortest cycle through each file, each cycle once: its paths, one on each line.
     pub fn cycles(&self) -> Vec<String> {
         let mut edges: BTreeMap<&Module, BTreeMap<Module, String>> = BTreeMap::new();
         for used in self.uses().into_iter().filter(|used| self.depends(used)) {
             let Use { module, source, mention, target } = used;
             edges.entry(module).or_default().entry(target).or_insert_with(|| position(source, mention));
         }
-        let mut cycles = BTreeSet::new();
-        for &start in edges.keys() {
-            let mut reached = BTreeSet::new();
-            let mut queue = VecDeque::from([(start, Vec::new())]);
-            while let Some((file, way)) = queue.pop_front() {
-                if file == start && !way.is_empty() {
-                    cycles.insert(way.into_iter().collect::<BTreeSet<&str>>());
-                    break;
-                }
-                for (next, step) in edges.get(file).into_iter().flatten() {
-                    if reached.insert(next) {
-                        queue.push_back((next, [way.as_slice(), &[step.as_str()]].concat()));
-                    }
-                }
+        shortest_circles(&edges)
+    }
+
+    /// Returns the circles among folders: for each two folders of one parent where each leads to the other, over any
+    /// number of folders of that parent, one path of each step. A path between two files counts for the two folders
+    /// where their places diverge.
+    pub fn folder_cycles(&self) -> Vec<String> {
+        let mut edges: BTreeMap<Module, BTreeMap<Module, String>> = BTreeMap::new();
+        for Use { module, source, mention, target } in self.uses() {
+            let shared = module.iter().zip(&target).take_while(|(from, to)| from == to).count();
+            let folders = [module, &target].map(|file| file[..file.len().min(shared + 1)].to_vec());
+            let diverge = folders.iter().all(|folder| folder.len() == shared + 1 && self.is_folder(folder));
+            if diverge {
+                let [from, to] = folders;
+                edges.entry(from).or_default().entry(to).or_insert_with(|| position(source, mention));
             }
         }
-        cycles.iter().map(|steps| steps.iter().map(|step| format!("{step}\n")).collect()).collect()
+        shortest_circles(&edges.iter().map(|(from, to)| (from, to.clone())).collect())
+    }
+
+    /// Returns whether a module is a folder.
+    fn is_folder(&self, module: &Module) -> bool {
+        self.modules.get(module).is_some_and(is_mod)
     }
 
     /// Returns whether a path makes its file depend on the file that the path leads to.
@@ -194,7 +202,8 @@ impl Sources {
             };
             return source.words.contains(name) || items.is_some_and(|items| !items.is_disjoint(&source.words));
         }
-        // An import of a folder is not a use of its `mod.rs`: the paths that begin with the imported name lead to the items.
+        // An import of a folder is not a use of its `mod.rs`: the paths that begin with the imported name lead to the
+        // items.
         let is_import = mention.kind != Kind::Code && !mention.binds("*");
         let is_folder = self.modules.get(target).is_some_and(is_mod);
         !(is_import && is_folder && self.names_module(module, mention))
@@ -207,12 +216,35 @@ impl Sources {
     }
 }
 
+/// Returns the shortest circle through each node of a graph, each circle once: the texts of its edges, one on each
+/// line.
+fn shortest_circles(edges: &BTreeMap<&Module, BTreeMap<Module, String>>) -> Vec<String> {
+    let mut cycles = BTreeSet::new();
+    for &start in edges.keys() {
+        let mut reached = BTreeSet::new();
+        let mut queue = VecDeque::from([(start, Vec::new())]);
+        while let Some((node, way)) = queue.pop_front() {
+            if node == start && !way.is_empty() {
+                cycles.insert(way.into_iter().collect::<BTreeSet<&str>>());
+                break;
+            }
+            for (next, step) in edges.get(node).into_iter().flatten() {
+                if reached.insert(next) {
+                    queue.push_back((next, [way.as_slice(), &[step.as_str()]].concat()));
+                }
+            }
+        }
+    }
+    cycles.iter().map(|steps| steps.iter().map(|step| format!("{step}\n")).collect()).collect()
+}
+
 /// Returns whether a file is a `mod.rs` or the root of the crate.
 fn is_mod(source: &Source) -> bool {
     source.file == "lib.rs" || source.file == "mod.rs" || source.file.ends_with("/mod.rs")
 }
 
-/// Returns whether an order lets one module use another. A module that is not in the order may use every module and be used by none.
+/// Returns whether an order lets one module use another. A module that is not in the order may use every module and be
+/// used by none.
 fn may_use(order: &Order, from: &str, to: &str) -> bool {
     let row = order.iter().find(|(name, _)| *name == from);
     row.is_none_or(|(_, inner)| from == to || inner.contains(&to))

@@ -1,6 +1,7 @@
 //! Changes to bytes without regard to their format.
 //!
-//! In: bytes, those of another seed. Out: bits flipped, numbers overwritten, parts removed, repeated, or inserted from the other seed.
+//! In: bytes, those of another seed. Out: bits flipped, numbers overwritten, parts removed, repeated, or inserted from
+//! the other seed.
 
 use super::numbers;
 use crate::support::random::Random;

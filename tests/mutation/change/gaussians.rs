@@ -1,7 +1,7 @@
 //! Gaussians at the ends of what readers accept and renderers draw.
 //!
-//! In: the values of one Gaussian in one section of a package. Out: other values: needles, sheets and Gaussians of every size, faint and bright
-//! ones, far away and fast.
+//! In: the values of one Gaussian in one section of a package. Out: other values: needles, sheets and Gaussians of
+//! every size, faint and bright ones, far away and fast.
 
 use super::numbers;
 use crate::support::random::Random;

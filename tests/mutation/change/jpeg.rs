@@ -5,7 +5,8 @@
 use super::{bytes, change_list, numbers};
 use crate::support::random::Random;
 
-/// A segment: its marker, its contents without the length, and the entropy-coded pixels that follow it up to the next marker.
+/// A segment: its marker, its contents without the length, and the entropy-coded pixels that follow it up to the next
+/// marker.
 #[derive(Clone)]
 pub struct Segment {
     marker: u8,

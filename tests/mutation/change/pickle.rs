@@ -1,6 +1,7 @@
 //! Changes to pickles, opcode by opcode.
 //!
-//! In: a pickle of protocol 2, that of another seed. Out: a pickle whose opcodes mostly have complete arguments, in a meaningless order.
+//! In: a pickle of protocol 2, that of another seed. Out: a pickle whose opcodes mostly have complete arguments, in a
+//! meaningless order.
 
 use super::{bytes, change_list, numbers};
 use crate::support::pth;

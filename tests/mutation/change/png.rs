@@ -1,6 +1,7 @@
 //! PNG files, chunk by chunk, and changes to them.
 //!
-//! In: chunks. Out: a file in which every length and every checksum is right. Pixels are stored without being compressed.
+//! In: chunks. Out: a file in which every length and every checksum is right. Pixels are stored without being
+//! compressed.
 
 use super::{bytes, change_list, numbers};
 use crate::support::random::Random;
@@ -12,7 +13,8 @@ pub struct Chunk {
     body: Vec<u8>,
 }
 
-/// Returns the chunks of a picture of noise: of this size, color type (0 gray, 2 RGB, 3 palette, 4 gray and alpha, 6 RGBA) and depth, bits.
+/// Returns the chunks of a picture of noise: of this size, color type (0 gray, 2 RGB, 3 palette, 4 gray and alpha, 6
+/// RGBA) and depth, bits.
 pub fn picture(width: u32, height: u32, color: u8, depth: u8, random: &mut Random) -> Vec<Chunk> {
     let channels = match color {
         2 => 3,

@@ -1,7 +1,7 @@
 //! Changes to texts that consist of brackets, commas, names and values: JSON, RON, and the `Namespace(..)` of Python.
 //!
-//! In: a text, that of another seed. Out: a text whose brackets mostly match, with a value replaced by one of another type or size, an item
-//! removed, repeated, moved or taken from the other text, or deeply nested brackets.
+//! In: a text, that of another seed. Out: a text whose brackets mostly match, with a value replaced by one of another
+//! type or size, an item removed, repeated, moved or taken from the other text, or deeply nested brackets.
 
 use super::bytes::MOST;
 use super::numbers;

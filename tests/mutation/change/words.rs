@@ -1,7 +1,7 @@
 //! Changes to texts that consist of lines of words, as COLMAP writes them.
 //!
-//! In: a text, that of another seed. Out: a text with words replaced by numbers and odd values, and words or lines removed, repeated, moved or taken
-//! from the other text.
+//! In: a text, that of another seed. Out: a text with words replaced by numbers and odd values, and words or lines
+//! removed, repeated, moved or taken from the other text.
 
 use super::bytes::MOST;
 use super::{change_list, numbers};

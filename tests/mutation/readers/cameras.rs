@@ -2,20 +2,18 @@
 //!
 //! In: camera files of every form. Out: files with wrong numbers, names and structures; accepted cameras draw a scene.
 
+use super::views::check_views;
 use super::{Outcome, Reader};
 use crate::change::{bytes, text};
 use crate::limits::Limits;
 use crate::support::random::Random;
 use crate::support::{dataset, packed_scene};
-use bevy_gs4d::offline::dataset::{CameraFile, CameraOptions, MAX_SIDE, TrainingView};
+use bevy_gs4d::offline::dataset::{CameraFile, CameraOptions, TrainingView};
 use bevy_gs4d::reference;
 use bevy_gs4d::scene::RuntimeScene;
 use glam::{UVec2, Vec3};
 use serde_json::{Value, json};
-use std::collections::HashSet;
-use std::ffi::OsStr;
 use std::fs;
-use std::path::Path;
 use tempfile::TempDir;
 
 /// Most views of a file that are drawn.
@@ -85,17 +83,7 @@ impl Reader for Cameras {
 impl Cameras {
     /// Checks the views of an accepted file, and draws some of them.
     fn check(&self, views: &[TrainingView]) -> Result<(), String> {
-        let mut names = HashSet::new();
-        for view in views {
-            let size = view.camera.size;
-            if size.min_element() < 1 || size.max_element() > MAX_SIDE {
-                return Err(format!("has pictures of {size} pixels"));
-            }
-            let plain = Path::new(&view.name).file_name() == Some(OsStr::new(&view.name));
-            if !plain || !names.insert(&view.name) {
-                return Err(format!("has a view named {:?}, which is no file name or not its own", view.name));
-            }
-        }
+        check_views(views)?;
         let small = views.iter().filter(|view| view.camera.size.max_element() <= SIDE);
         for TrainingView { camera, time, .. } in small.take(DRAWN) {
             let view = camera.view(*time, self.scene.trained_with.raster_fov);

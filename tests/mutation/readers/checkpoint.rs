@@ -1,6 +1,7 @@
 //! Checkpoints.
 //!
-//! In: crafted checkpoints of every model. Out: archives with a right directory and right checksums, and wrong pickles and tensors.
+//! In: crafted checkpoints of every model. Out: archives with a right directory and right checksums, and wrong pickles
+//! and tensors.
 
 use super::{Outcome, Reader};
 use crate::accepted::{self, DrawnBy};
@@ -13,7 +14,8 @@ use bevy_gs4d::codec::checkpoint;
 use std::io::{Cursor, Read};
 use zip::ZipArchive;
 
-/// One accepted checkpoint of this many is drawn by the GPU: their Gaussians pass through the same slice as those of packages.
+/// One accepted checkpoint of this many is drawn by the GPU: their Gaussians pass through the same slice as those of
+/// packages.
 const DRAWN_BY_GPU: u32 = 4;
 
 /// The reader of checkpoints.
@@ -53,8 +55,8 @@ impl Reader for Checkpoints {
     }
 }
 
-/// Returns a checkpoint of the rotated 4D model, one with an environment map and few coefficients, one of the unrotated 4D model, and one of
-/// the static model.
+/// Returns a checkpoint of the rotated 4D model, one with an environment map and few coefficients, one of the unrotated
+/// 4D model, and one of the static model.
 pub fn checkpoints() -> Vec<Pth> {
     let rotating = Pth::rotating(5, 48);
     let mut surrounded = Pth::rotating(3, 16);

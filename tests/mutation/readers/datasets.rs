@@ -1,21 +1,20 @@
 //! Files of datasets of other programs.
 //!
-//! In: a file of a nerfstudio, COLMAP or N3V folder, whose other files are whole. Out: files with wrong numbers, names and structures. Accepted folders
-//! have views of allowed sizes with finite cameras and names of their own, and their cameras are drawn.
+//! In: a file of a nerfstudio, COLMAP or N3V folder, whose other files are whole. Out: files with wrong numbers, names
+//! and structures. Accepted folders have views of allowed sizes with finite cameras and names of their own, and their
+//! cameras are drawn.
 
+use super::views::check_views;
 use super::{Outcome, Reader};
 use crate::change::{bytes, text, words};
 use crate::support::random::Random;
-use bevy_gs4d::internal::offline::dataset::drawing::draw;
-use bevy_gs4d::internal::offline::dataset::summary::Summary;
-use bevy_gs4d::offline::dataset::{CameraOptions, Dataset, MAX_SIDE, Split, TrainingView};
+use bevy_gs4d::internal::offline::dataset::Summary;
+use bevy_gs4d::internal::offline::dataset::draw;
+use bevy_gs4d::offline::dataset::{CameraOptions, Dataset, Split, TrainingView};
 use bevy_gs4d::view::RasterFov;
 use glam::UVec2;
 use serde_json::json;
-use std::collections::HashSet;
-use std::ffi::OsStr;
 use std::fs;
-use std::path::Path;
 use tempfile::TempDir;
 
 /// Number of cameras of each seed.
@@ -41,11 +40,7 @@ impl Datasets {
             }
             _ => vec![("sparse/0/cameras.txt", cameras_txt()), ("sparse/0/images.txt", images_txt())],
         };
-        for (name, bytes) in whole {
-            let path = folder.path().join(name);
-            fs::create_dir_all(path.parent().expect("inside the folder")).expect("the folder can be made");
-            fs::write(path, bytes).expect("the folder can be written to");
-        }
+        write(&folder, whole);
         if file == "poses_bounds.npy" {
             for camera in 0..CAMERAS {
                 let path = folder.path().join(format!("cam{camera:02}/0000.png"));
@@ -61,6 +56,23 @@ impl Datasets {
             _ => {}
         }
         Self { folder, file, seeds }
+    }
+
+    /// Makes the files of a folder, of which one is the seed.
+    pub fn of(file: &'static str, whole: &[(&str, Vec<u8>)]) -> Self {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        write(&folder, whole);
+        let seeds = whole.iter().filter(|(name, _)| *name == file).map(|(_, bytes)| bytes.clone()).collect();
+        Self { folder, file, seeds }
+    }
+}
+
+/// Writes the files of a folder.
+fn write(folder: &TempDir, whole: &[(&str, Vec<u8>)]) {
+    for (name, bytes) in whole {
+        let path = folder.path().join(name);
+        fs::create_dir_all(path.parent().expect("inside the folder")).expect("the folder can be made");
+        fs::write(path, bytes).expect("the folder can be written to");
     }
 }
 
@@ -103,21 +115,11 @@ impl Reader for Datasets {
 
 /// Checks the views of an accepted folder.
 fn check(views: &[TrainingView]) -> Result<(), String> {
-    let mut names = HashSet::new();
-    for view in views {
-        let size = view.camera.size;
-        if size.min_element() < 1 || size.max_element() > MAX_SIDE {
-            return Err(format!("has pictures of {size} pixels"));
-        }
-        let plain = Path::new(&view.name).file_name() == Some(OsStr::new(&view.name));
-        if !plain || !names.insert(&view.name) {
-            return Err(format!("has a view named {:?}, which is no file name or not its own", view.name));
-        }
-        if !view.camera.view(view.time, RasterFov::Corrected).is_finite() {
-            return Err(format!("has a view {:?} that is not finite", view.name));
-        }
+    check_views(views)?;
+    match views.iter().find(|view| !view.camera.view(view.time, RasterFov::Corrected).is_finite()) {
+        Some(view) => Err(format!("has a view {:?} that is not finite", view.name)),
+        None => Ok(()),
     }
-    Ok(())
 }
 
 fn nerfstudio(model: &str) -> Vec<u8> {
@@ -128,14 +130,15 @@ fn nerfstudio(model: &str) -> Vec<u8> {
         })
     };
     let file = json!({
-        "camera_model": model, "w": 40, "h": 30, "fl_x": 50.0, "fl_y": 51.0, "cx": 19.0, "cy": 16.0, "k1": 0.01, "k2": -0.01,
-        "k3": 0.0, "k4": 0.0, "train_filenames": ["images/f1.png", "images/f2.png"], "test_filenames": ["images/f0.png"],
+        "camera_model": model, "w": 40, "h": 30, "fl_x": 50.0, "fl_y": 51.0, "cx": 19.0, "cy": 16.0,
+        "k1": 0.01, "k2": -0.01, "k3": 0.0, "k4": 0.0,
+        "train_filenames": ["images/f1.png", "images/f2.png"], "test_filenames": ["images/f0.png"],
         "ply_file_path": "points.ply", "frames": (0..CAMERAS).map(frame).collect::<Vec<_>>(),
     });
     file.to_string().into_bytes()
 }
 
-fn poses() -> Vec<u8> {
+pub fn poses() -> Vec<u8> {
     let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({CAMERAS}, 17), }}\n");
     let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
     bytes.extend((header.len() as u16).to_le_bytes());

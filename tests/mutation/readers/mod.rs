@@ -1,10 +1,13 @@
 //! The readers, and how their inputs are made.
 //!
-//! In: random numbers. Out: the bytes of a file for one reader, and the outcome of reading them. `KINDS` lists the readers.
+//! In: random numbers. Out: the bytes of a file for one reader, and the outcome of reading them. `KINDS` lists the
+//! readers.
 //!
-//! Two readers are not included: timelines (`*.timeline.ron`), which only a Bevy app can load, and the state of fine-tuning, which needs a GPU. Both are
-//! RON or bytes behind a checksum, whose tests are `plugin/playback/timeline/file.rs` and `offline/store.rs`.
+//! Two readers are not included: timelines (`*.timeline.ron`), which only a Bevy app can load, and the state of
+//! fine-tuning, which needs a GPU. Both are RON or bytes behind a checksum, whose tests are in
+//! `plugin/playback/timeline/file.rs` and `offline/store/results.rs`.
 
+mod calibrations;
 mod cameras;
 mod checkpoint;
 mod datasets;
@@ -13,9 +16,12 @@ mod package;
 mod parts;
 mod pictures;
 mod points;
+mod rigs;
 mod saved;
 mod scores;
 mod settings;
+mod studios;
+mod views;
 
 use crate::support::random::Random;
 use std::sync::Arc;
@@ -58,7 +64,7 @@ pub struct Kind {
 }
 
 /// The readers.
-pub static KINDS: [Kind; 39] = [
+pub static KINDS: &[Kind] = &[
     Kind {
         name: "package",
         about: "packages (.gs4d) in every form, with filters and environment maps",
@@ -93,6 +99,139 @@ pub static KINDS: [Kind; 39] = [
         extension: "npy",
         share: 1,
         make: || Arc::new(datasets::Datasets::new("poses_bounds.npy")),
+    },
+    Kind {
+        name: "panoptic",
+        about: "train_meta.json of PanopticSports",
+        extension: "json",
+        share: 1,
+        make: || Arc::new(datasets::Datasets::of("train_meta.json", &studios::panoptic())),
+    },
+    Kind {
+        name: "panoptic-points",
+        about: "init_pt_cld.npz of PanopticSports",
+        extension: "npz",
+        share: 1,
+        make: || Arc::new(points::Points::new("init_pt_cld.npz")),
+    },
+    Kind {
+        name: "easyvolcap-intri",
+        about: "intri.yml of EasyVolcap",
+        extension: "yml",
+        share: 1,
+        make: || Arc::new(datasets::Datasets::of("intri.yml", &studios::easyvolcap())),
+    },
+    Kind {
+        name: "easyvolcap-extri",
+        about: "extri.yml of EasyVolcap",
+        extension: "yml",
+        share: 1,
+        make: || Arc::new(datasets::Datasets::of("extri.yml", &studios::easyvolcap())),
+    },
+    Kind {
+        name: "selfcap-sync",
+        about: "sync.json of SelfCap",
+        extension: "json",
+        share: 1,
+        make: || Arc::new(datasets::Datasets::of("sync.json", &studios::easyvolcap())),
+    },
+    Kind {
+        name: "zju",
+        about: "annots.npy of ZJU-MoCap: pickles of lists and of arrays",
+        extension: "npy",
+        share: 1,
+        make: || Arc::new(studios::Annotations::new()),
+    },
+    Kind {
+        name: "llff",
+        about: "poses_bounds.npy of LLFF, with a picture for each row",
+        extension: "npy",
+        share: 1,
+        make: || Arc::new(datasets::Datasets::of("poses_bounds.npy", &rigs::llff())),
+    },
+    Kind {
+        name: "nerfies",
+        about: "names of the pictures of Nerfies",
+        extension: "json",
+        share: 1,
+        make: || Arc::new(datasets::Datasets::of("dataset.json", &rigs::nerfies())),
+    },
+    Kind {
+        name: "nerfies-camera",
+        about: "a camera file of Nerfies",
+        extension: "json",
+        share: 1,
+        make: || Arc::new(datasets::Datasets::of("camera/a.json", &rigs::nerfies())),
+    },
+    Kind {
+        name: "nerfies-scene",
+        about: "center and scale of Nerfies",
+        extension: "json",
+        share: 1,
+        make: || Arc::new(datasets::Datasets::of("scene.json", &rigs::nerfies())),
+    },
+    Kind {
+        name: "nerfies-metadata",
+        about: "moments of the pictures of Nerfies",
+        extension: "json",
+        share: 1,
+        make: || Arc::new(datasets::Datasets::of("metadata.json", &rigs::nerfies())),
+    },
+    Kind {
+        name: "nerfies-points",
+        about: "points.npy of Nerfies",
+        extension: "npy",
+        share: 1,
+        make: || Arc::new(points::Points::new("points.npy")),
+    },
+    Kind {
+        name: "technicolor",
+        about: "cameras_parameters.txt of Technicolor",
+        extension: "txt",
+        share: 1,
+        make: || Arc::new(datasets::Datasets::of("cameras_parameters.txt", &rigs::technicolor())),
+    },
+    Kind {
+        name: "immersive",
+        about: "models.json of Google Immersive",
+        extension: "json",
+        share: 1,
+        make: || Arc::new(datasets::Datasets::of("models.json", &rigs::immersive())),
+    },
+    Kind {
+        name: "nerfstudio-matrices",
+        about: "transforms.json with the matrix of each lens",
+        extension: "json",
+        share: 1,
+        make: || Arc::new(datasets::Datasets::of("transforms.json", &calibrations::matrices())),
+    },
+    Kind {
+        name: "pose2sim",
+        about: "Calib.toml of Pose2Sim",
+        extension: "toml",
+        share: 1,
+        make: || Arc::new(datasets::Datasets::of("Calib.toml", &calibrations::pose2sim())),
+    },
+    Kind {
+        name: "qualisys",
+        about: "Calib.qca.txt of Qualisys",
+        extension: "txt",
+        share: 1,
+        make: || Arc::new(datasets::Datasets::of("Calib.qca.txt", &calibrations::qualisys())),
+    },
+    Kind {
+        name: "record3d",
+        about: "metadata.json of Record3D",
+        extension: "json",
+        share: 1,
+        make: || Arc::new(datasets::Datasets::of("metadata.json", &calibrations::record3d())),
+    },
+    Kind {
+        name: "polycam",
+        about: "a camera of Polycam",
+        extension: "json",
+        share: 1,
+        make: || Arc::new(datasets::Datasets::of("keyframes/corrected_cameras/0.json", &calibrations::polycam())),
     },
     Kind {
         name: "colmap-cameras",

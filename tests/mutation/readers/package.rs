@@ -1,6 +1,7 @@
 //! Packages.
 //!
-//! In: small scenes in every form. Out: packages with right checksums, lengths and compression, and a wrong header or wrong sections.
+//! In: small scenes in every form. Out: packages with right checksums, lengths and compression, and a wrong header or
+//! wrong sections.
 
 use super::{Outcome, Reader};
 use crate::accepted::{self, DrawnBy};
@@ -11,8 +12,8 @@ use bevy_gs4d::codec::package::{
     self, EnvironmentSize, Header, MAGIC, Section, StoredFilter, StoredForm, VERSION, WriteSettings,
 };
 use bevy_gs4d::gaussian::{Model, Parameters};
-use bevy_gs4d::internal::codec::package::{FLOAT_PLANES, PACKAGE};
-use bevy_gs4d::offline::quantize::compress;
+use bevy_gs4d::internal::codec::{FLOAT_PLANES, PACKAGE};
+use bevy_gs4d::offline::compress::compress;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{
     Environment, FilterKind, GaussianScene, Level, RuntimeScene, SceneForm, TemporalFilter, Trained,
@@ -233,7 +234,8 @@ impl Parts {
         }
     }
 
-    /// Replaces the sections by those that the header requires, with the required sizes, so that a reader reads their contents.
+    /// Replaces the sections by those that the header requires, with the required sizes, so that a reader reads their
+    /// contents.
     fn fit(&mut self) {
         let needed = layout(&self.header);
         if needed.iter().any(|&(_, rows, width)| rows.saturating_mul(width).saturating_mul(4) > FITTED) {
@@ -256,7 +258,8 @@ impl Parts {
         }
     }
 
-    /// Returns the file: with compressed bodies, mostly right lengths and checksums, and sometimes a changed text of the header.
+    /// Returns the file: with compressed bodies, mostly right lengths and checksums, and sometimes a changed text of
+    /// the header.
     fn seal(mut self, other: &Header, random: &mut Random) -> Vec<u8> {
         let mut sections = Vec::new();
         for (section, planes) in self.header.sections.iter_mut().zip(&self.bodies) {

@@ -1,7 +1,7 @@
 //! Parts of shards: of scores, masks and evaluations.
 //!
-//! In: parts that `gs4d` has made. Out: a part with another label or another result, behind the right hash; all parts of the computation are
-//! put together, and what is accepted gives scores, a filter that fits the scene, or metrics.
+//! In: parts that `gs4d` has made. Out: a part with another label or another result, behind the right hash; all parts
+//! of the computation are put together, and what is accepted gives scores, a filter that fits the scene, or metrics.
 //!
 //! An input is the name of the file, a line break, the label, a line break, and the result.
 
@@ -10,13 +10,14 @@ use crate::change::{bytes, numbers, text};
 use crate::support::dataset;
 use crate::support::random::Random;
 use bevy_gs4d::codec::package::WriteSettings;
-use bevy_gs4d::internal::offline::shard::Label;
-use bevy_gs4d::internal::offline::shard::part;
-use bevy_gs4d::internal::offline::{evaluation_parts, score, temporal_filter};
+use bevy_gs4d::internal::offline::filter;
+use bevy_gs4d::internal::offline::measure;
+use bevy_gs4d::internal::offline::score;
+use bevy_gs4d::internal::offline::store::{self, Label};
 use bevy_gs4d::offline;
 use bevy_gs4d::offline::score::Variant;
-use bevy_gs4d::scene::FilterKind;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use bevy_gs4d::scene::{FilterKind, TemporalFilter};
 use glam::{UVec2, Vec3};
 use std::fs;
 use std::path::PathBuf;
@@ -51,7 +52,7 @@ impl Parts {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let [input, data] = ["scene.gs4d", "data"].map(|name| folder.path().join(name));
         let scene = synthesize(&SynthSettings { count: COUNT, degree: 0, ..SynthSettings::default() });
-        offline::save(&input, &scene, &WriteSettings::default()).expect("the folder can be written to");
+        offline::work::save(&input, &scene, &WriteSettings::default()).expect("the folder can be written to");
         let runtime = scene.into_runtime().expect("a synthetic scene can be drawn");
         dataset::write(&data, &runtime, Vec3::ZERO, 2, VIEWS / 2, UVec2::splat(24), true);
         let mut seeds = Vec::new();
@@ -74,8 +75,8 @@ impl Parts {
                 });
                 let run = command.output().expect("the command starts");
                 assert!(run.status.success(), "{name}: {}", String::from_utf8_lossy(&run.stderr));
-                let label = part::label(&path).expect("a part");
-                let result = part::result(&path, MOST).expect("a part");
+                let label = store::label(&path).expect("a part");
+                let result = store::result(&path, MOST).expect("a part");
                 let text = ron::to_string(&label).expect("a label is text");
                 seeds.push(Seed { name, label, text, result });
             }
@@ -127,20 +128,24 @@ impl Reader for Parts {
         let paths = [self.path(&format!("changed-{}", seed.name)), self.path(&partner.name)];
         fs::write(&paths[0], file(label, result)).expect("the folder can be written to");
         let outcome = match at / 2 {
-            0 => score::merge(&paths, None).map(|scores| {
+            0 => score::merge(&paths, None).map_err(|error| error.to_string()).map(|scores| {
                 let lengths = Variant::ALL.map(|variant| scores.of(variant).map_or(0, |scores| scores.len()));
                 lengths.iter().all(|&length| length == COUNT)
             }),
             1 => {
-                let filter = temporal_filter::merge(&paths, &partner.label, FilterKind::Interval, KEYS, COUNT);
-                filter.map(|filter| (filter.count, filter.segments) == (COUNT, KEYS - 1))
+                let filter = filter::merge(&paths, &partner.label, FilterKind::Interval, KEYS, COUNT);
+                let fits = |filter: TemporalFilter| (filter.count, filter.segments) == (COUNT, KEYS - 1);
+                filter.map_err(|error| error.to_string()).map(fits)
             }
-            _ => evaluation_parts::merge(&paths, &partner.label, VIEWS).map(|all| all.views.len() == VIEWS),
+            _ => {
+                let all = measure::merge(&paths, &partner.label, VIEWS);
+                all.map_err(|error| error.to_string()).map(|all| all.views.len() == VIEWS)
+            }
         };
         match outcome {
             Ok(true) => Ok(Outcome::Accepted),
             Ok(false) => Err("is put together to a result of another size".to_owned()),
-            Err(error) => Ok(Outcome::Refused(error.to_string())),
+            Err(reason) => Ok(Outcome::Refused(reason)),
         }
     }
 }

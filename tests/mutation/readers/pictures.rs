@@ -1,16 +1,17 @@
 //! Pictures.
 //!
-//! In: small PNG, JPEG and EXR files of several kinds, and raw pictures. Out: files whose chunks and segments have right lengths and checksums, with
-//! wrong sizes, tables and pixels; each is read as image and mask, in every way that training images are read.
+//! In: small PNG, JPEG and EXR files of several kinds, and raw pictures. Out: files whose chunks and segments have
+//! right lengths and checksums, with wrong sizes, tables and pixels; each is read as image and mask, in every way that
+//! training images are read.
 
 use super::{Outcome, Reader};
 use crate::change::jpeg::Segment;
 use crate::change::png::Chunk;
 use crate::change::{bytes, jpeg, numbers, png};
 use crate::support::random::Random;
-use bevy_gs4d::internal::offline::comparison::Pair;
+use bevy_gs4d::internal::offline::measure::Pair;
 use bevy_gs4d::offline::dataset::{CameraFile, CameraOptions, TrainingView};
-use bevy_gs4d::offline::metrics::ImageMetrics;
+use bevy_gs4d::offline::measure::ImageMetrics;
 use bevy_gs4d::view::{Camera, Picture};
 use glam::{Mat4, UVec2, Vec3};
 use image::codecs::jpeg::JpegEncoder;

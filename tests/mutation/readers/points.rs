@@ -1,12 +1,13 @@
 //! Files of points to begin a training with.
 //!
-//! In: points as PLY, binary and as text, and of COLMAP. Out: files with wrong numbers, names, lengths and structures. Accepted points are finite and
-//! have colors.
+//! In: points as PLY, binary and as text, of COLMAP, of Nerfies and of `PanopticSports`. Out: files with wrong numbers,
+//! names, lengths and structures. Accepted points are finite and have colors.
 
 use super::{Outcome, Reader};
+use crate::change::archive::{self, Entry};
 use crate::change::{bytes, words};
 use crate::support::random::Random;
-use bevy_gs4d::internal::offline::dataset::point_cloud::PointCloud;
+use bevy_gs4d::internal::offline::dataset::PointCloud;
 use bevy_gs4d::scene::Origin;
 use std::fs;
 use std::path::PathBuf;
@@ -28,6 +29,8 @@ impl Points {
         let seeds = match file {
             "points3D.bin" => vec![binary()],
             "points3D.txt" => vec![text()],
+            "points.npy" => vec![npy("<f4", 3), npy(">f8", 3)],
+            "init_pt_cld.npz" => vec![npy("<f4", 7), npy(">f8", 7)],
             _ => vec![ply("ascii"), ply("binary_little_endian"), ply("binary_big_endian")],
         };
         let folder = tempfile::tempdir().expect("a temporary folder");
@@ -44,6 +47,9 @@ impl Reader for Points {
         };
         if file == *seed || random.one_in(16) {
             bytes::change(&mut file, other, random);
+        }
+        if self.file.extension().is_some_and(|extension| extension == "npz") {
+            return archived(file, random);
         }
         file
     }
@@ -68,6 +74,15 @@ impl Reader for Points {
     }
 }
 
+/// Returns the archive of an array, with right checksums and lengths but sometimes.
+fn archived(array: Vec<u8>, random: &mut Random) -> Vec<u8> {
+    let mut entries = vec![Entry::new("data.npy".to_owned(), array)];
+    if random.one_in(4) {
+        archive::change(&mut entries, &[], random);
+    }
+    archive::file(&entries)
+}
+
 fn binary() -> Vec<u8> {
     let mut bytes = u64::from(POINTS).to_le_bytes().to_vec();
     for point in 0..POINTS {
@@ -87,10 +102,24 @@ fn text() -> Vec<u8> {
     format!("# points\n{lines}").into_bytes()
 }
 
+fn npy(kind: &str, columns: u8) -> Vec<u8> {
+    let header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({POINTS}, {columns}), }}\n");
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((header.len() as u16).to_le_bytes());
+    bytes.extend(header.bytes());
+    for value in (0..columns * POINTS).map(f32::from) {
+        match kind {
+            "<f4" => bytes.extend(value.to_le_bytes()),
+            _ => bytes.extend(f64::from(value).to_be_bytes()),
+        }
+    }
+    bytes
+}
+
 fn ply(encoding: &str) -> Vec<u8> {
     let header = format!(
-        "ply\nformat {encoding} 1.0\nelement vertex {POINTS}\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\n\
-         property uchar green\nproperty uchar blue\nproperty float time\nend_header\n"
+        "ply\nformat {encoding} 1.0\nelement vertex {POINTS}\nproperty float x\nproperty float y\nproperty float z\n\
+         property uchar red\nproperty uchar green\nproperty uchar blue\nproperty float time\nend_header\n"
     );
     let mut bytes = header.into_bytes();
     for point in 0..POINTS {

@@ -1,7 +1,7 @@
 //! The stored results of a bake.
 //!
-//! In: what a bake leaves in its folder. Out: one of its files with other contents, behind a header with the right key and hash; the
-//! bake resumes from there, and a package that it writes must be one that can be read and drawn.
+//! In: what a bake leaves in its folder. Out: one of its files with other contents, behind a header with the right key
+//! and hash; the bake resumes from there, and a package that it writes must be one that can be read and drawn.
 //!
 //! An input is the name of the file, a line break, and its contents without the header.
 
@@ -12,15 +12,16 @@ use crate::support::dataset;
 use crate::support::random::Random;
 use bevy_gs4d::codec::package::WriteSettings;
 use bevy_gs4d::codec::{self, ReadOptions};
-use bevy_gs4d::offline::KeyFrames;
-use bevy_gs4d::offline::SplitOptions;
+use bevy_gs4d::offline;
 use bevy_gs4d::offline::bake::{BakeSettings, bake};
+use bevy_gs4d::offline::compress::Quality;
+use bevy_gs4d::offline::dataset::SplitOptions;
 use bevy_gs4d::offline::engine::Engine;
-use bevy_gs4d::offline::quantize::Quality;
+use bevy_gs4d::offline::filter::KeyFrames;
+use bevy_gs4d::offline::prune::{Goal, ScoreChoice};
 use bevy_gs4d::offline::score::ScoringSettings;
 use bevy_gs4d::offline::score::Variant;
-use bevy_gs4d::offline::{self, NoProgress};
-use bevy_gs4d::offline::{Goal, ScoreChoice};
+use bevy_gs4d::offline::work::NoProgress;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{FilterKind, GaussianScene};
 use glam::{UVec2, Vec3};
@@ -50,7 +51,7 @@ impl Saved {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let [checkpoint, data, out] = ["scene.gs4d", "data", "out.gs4d"].map(|name| folder.path().join(name));
         let scene = synthesize(&SynthSettings { count: 60, degree: 0, ..SynthSettings::default() });
-        offline::save(&checkpoint, &scene, &WriteSettings::default()).expect("the folder can be written to");
+        offline::work::save(&checkpoint, &scene, &WriteSettings::default()).expect("the folder can be written to");
         let runtime = scene.clone().into_runtime().expect("a synthetic scene can be drawn");
         dataset::write(&data, &runtime, Vec3::ZERO, 2, 2, UVec2::splat(24), false);
         let settings = BakeSettings {

@@ -10,7 +10,7 @@ use crate::support::random::Random;
 use bevy_gs4d::codec::package::{self, WriteSettings};
 use bevy_gs4d::internal::offline::prune::{highest, select};
 use bevy_gs4d::internal::offline::score::read_weights;
-use bevy_gs4d::offline::quantize::{CompressSettings, compress};
+use bevy_gs4d::offline::compress::{CompressSettings, compress};
 use bevy_gs4d::offline::score::read_scores;
 use bevy_gs4d::scene::{GaussianScene, RuntimeScene};
 use std::fs;
@@ -69,7 +69,8 @@ impl Reader for ScoreFiles {
 }
 
 impl ScoreFiles {
-    /// Compresses the scene with these weights. If compression accepts them, the written package must be readable and drawable.
+    /// Compresses the scene with these weights. If compression accepts them, the written package must be readable and
+    /// drawable.
     fn compress_by(&self, weights: Vec<f32>) -> Result<(), String> {
         let settings = CompressSettings { weights: Some(weights), ..packed_scene::settings(&[4, 4]) };
         let Ok((compressed, _)) = compress(self.scene.clone(), &settings) else { return Ok(()) };

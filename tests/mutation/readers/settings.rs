@@ -1,6 +1,7 @@
 //! Settings that a checkpoint does not contain: `cfg_args` in its folder, and the options in RON.
 //!
-//! In: texts of the trainer and of the settings of a loader. Out: changed texts, read together with a valid checkpoint and a valid package.
+//! In: texts of the trainer and of the settings of a loader. Out: changed texts, read together with a valid checkpoint
+//! and a valid package.
 
 use super::checkpoint::checkpoints;
 use super::{Outcome, Reader};
@@ -37,7 +38,7 @@ impl Folder {
         let pth = checkpoints().remove(0).bytes();
         fs::write(folder.file("chkpnt.pth"), pth).expect("the folder can be written to");
         let scene = GaussianScene::from(packed_scene::scene(12, 0, 0));
-        offline::save(&folder.file("scene.gs4d"), &scene, &WriteSettings::default()).expect("a synthetic scene");
+        offline::work::save(&folder.file("scene.gs4d"), &scene, &WriteSettings::default()).expect("a synthetic scene");
         folder
     }
 

@@ -1,7 +1,8 @@
 //! The player of a page, without Bevy.
 //!
-//! In: a canvas, then a file, then cameras and times. Out: pictures on the canvas. The page calls [`Player`] from JavaScript (`page/player.js`); nothing
-//! here waits: a file is opened in steps, and the page asks whether the device has finished the last picture.
+//! In: a canvas, then a file, then cameras and times. Out: pictures on the canvas. The page calls [`Player`] from
+//! JavaScript (`page/player.js`); nothing here waits: a file is opened in steps, and the page asks whether the device
+//! has finished the last picture.
 
 use bevy_gs4d::renderer::{
     ActiveList, CaptureUpload, Design, GpuCapture, GpuContext, Instance, Renderer, ShaderChecks, ViewParameters,
@@ -24,7 +25,8 @@ use present::Present;
 /// Bytes that a step uploads.
 const UPLOAD: u64 = 1 << 18;
 
-/// Bytes that are uploaded before the device has to have taken them: a browser blocks the page where it has no more memory for them.
+/// Bytes that are uploaded before the device has to have taken them: a browser blocks the page where it has no more
+/// memory for them.
 const UPLOADED_AT_ONCE: u64 = 1 << 22;
 
 /// A player on a canvas.
@@ -157,7 +159,8 @@ impl Player {
         Ok(())
     }
 
-    /// Begins to open a file, whose length is 0 if it is not known. The capture that is shown stays until the file is open.
+    /// Begins to open a file, whose length is 0 if it is not known. The capture that is shown stays until the file is
+    /// open.
     pub fn open(&mut self, name: &str, length: usize) {
         // The memory of a file that was being opened is free before that of the next is needed.
         self.opening = None;

@@ -1,7 +1,7 @@
 //! The player of a page as a Bevy app: the model of a game in a browser.
 //!
-//! In: a canvas, then a file, then cameras and times. Out: pictures on the canvas. The page calls [`Player`] from JavaScript (`page/player.js`), as it
-//! calls the player without Bevy; a system of the app carries out what was called.
+//! In: a canvas, then a file, then cameras and times. Out: pictures on the canvas. The page calls [`Player`] from
+//! JavaScript (`page/player.js`), as it calls the player without Bevy; a system of the app applies the calls.
 
 use bevy::asset::AssetMetaCheck;
 use bevy::camera::PerspectiveProjection;
@@ -40,8 +40,8 @@ struct State {
     /// The background in place of that of the capture, which is `trained`.
     background: Option<[f32; 3]>,
     trained: [f32; 3],
-    /// From the app: whether the scene is shown, why not, the frames until the last picture is on the canvas, and whether only the device has
-    /// to finish it.
+    /// From the app: whether the scene is shown, why not, the frames until the last picture is on the canvas, and
+    /// whether only the device has to finish it.
     shown: bool,
     failed: Option<String>,
     left: u32,
@@ -87,7 +87,7 @@ impl Player {
             .insert_resource(shared.clone())
             .insert_resource(ClearColor(Color::BLACK))
             .add_systems(Startup, setup)
-            .add_systems(Update, obey)
+            .add_systems(Update, apply_calls)
             .run();
         Ok(Self { opening: None, about: None, shared })
     }
@@ -102,7 +102,8 @@ impl Player {
         self.shared.state().background = color.and_then(|color| color.try_into().ok());
     }
 
-    /// Begins to open a file, whose length is 0 if it is not known. The capture that is shown stays until the file is open.
+    /// Begins to open a file, whose length is 0 if it is not known. The capture that is shown stays until the file is
+    /// open.
     pub fn open(&mut self, name: &str, length: usize) {
         // The memory of a file that was being opened is free before that of the next is needed.
         self.opening = None;
@@ -185,8 +186,8 @@ fn setup(mut commands: Commands) {
     commands.spawn((Camera3d::default(), Msaa::Off, Tonemapping::None));
 }
 
-/// Carries out what the page has called.
-fn obey(
+/// Applies the calls of the page.
+fn apply_calls(
     mut commands: Commands,
     shared: Res<Shared>,
     queue: Option<Res<RenderQueue>>,

@@ -3,7 +3,7 @@
 //! In: the id of an export, degrees of color. Out: the bytes of a file for each degree.
 
 use crate::support::packed_scene;
-use bevy_gs4d::internal::codec::export::{Export, Exporter};
+use bevy_gs4d::internal::codec::{Export, Exporter};
 use bevy_gs4d::scene::GaussianScene;
 
 /// Gaussians of the scene.

@@ -1,7 +1,7 @@
 //! Files of other makes.
 //!
-//! In: files of each format, written by the exporters or by hand. Out: the same with changed bytes, changed entries of archives, changed numbers and
-//! texts, and changed data behind compression.
+//! In: files of each format, written by the exporters or by hand. Out: the same with changed bytes, changed entries of
+//! archives, changed numbers and texts, and changed data behind compression.
 //!
 //! `seed` changes files by their structure; `exported`, `gltf`, `ply`, `sog`, `tracks` and `others` make them.
 

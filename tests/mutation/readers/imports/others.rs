@@ -1,6 +1,7 @@
 //! Files that no exporter writes.
 //!
-//! In: nothing. Out: the bytes of parameters of Dynamic 3D Gaussians, of a capture of splaTV and of captures of `GaussianSplats3D`.
+//! In: nothing. Out: the bytes of parameters of Dynamic 3D Gaussians, of a capture of splaTV and of captures of
+//! `GaussianSplats3D`.
 
 use super::{packed, value};
 use half::f16;
@@ -46,7 +47,8 @@ pub fn splatv(curve: f32) -> Vec<u8> {
     file
 }
 
-/// Returns a capture of `GaussianSplats3D` of six splats of degree 1 at a level of compression: a full bucket of four, and one of two.
+/// Returns a capture of `GaussianSplats3D` of six splats of degree 1 at a level of compression: a full bucket of four,
+/// and one of two.
 pub fn ksplat(level: u16) -> Vec<u8> {
     let put = |bytes: &mut [u8], words: &[(usize, u32)]| {
         for &(index, word) in words {

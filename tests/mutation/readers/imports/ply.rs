@@ -45,7 +45,8 @@ pub fn still() -> Vec<Vec<u8>> {
     ]
 }
 
-/// Returns the sources of `.sogst`, on straight and on curved paths, and of `.sog4d`, and frames of motion as Brush plays them.
+/// Returns the sources of `.sogst`, on straight and on curved paths, and of `.sog4d`, and frames of motion as Brush
+/// plays them.
 pub fn moving() -> Vec<Vec<u8>> {
     let common = [("f_dc", 3), ("scale", 3), ("rot", 4)];
     let sogst = "comment sogst.time_min 0\ncomment sogst.time_max 2\ncomment sogst.cov2d_scale 1 1\n";

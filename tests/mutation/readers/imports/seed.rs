@@ -1,19 +1,18 @@
 //! A file of another make, and how it is changed.
 //!
-//! In: the bytes of a file. Out: its parts by their structure ([`Seed`]), and files with some of these changed, behind compression, lengths and
-//! checksums that are right.
+//! In: the bytes of a file. Out: its parts by their structure ([`Seed`]), and files with some of these changed, behind
+//! compression, lengths and checksums that are right.
 
 use super::unpacked;
 use crate::change::archive::{self, Entry};
 use crate::change::{bytes, text, words};
+use crate::support::gzip::gzip;
 use crate::support::random::Random;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use flate2::Compression;
 use flate2::read::GzDecoder;
-use flate2::write::GzEncoder;
 use image_webp::{ColorType, WebPEncoder};
-use std::io::{Read, Write};
+use std::io::Read;
 
 /// What stands for the binary data in the JSON of a text file.
 const BINARY: &str = "BINARY";
@@ -231,12 +230,6 @@ fn texture(random: &mut Random) -> Vec<u8> {
     let encoder = WebPEncoder::new(&mut file);
     encoder.encode(&texels, width as u32, height as u32, ColorType::Rgba8).expect("a small picture");
     file
-}
-
-fn gzip(inner: &[u8]) -> Vec<u8> {
-    let mut writer = GzEncoder::new(Vec::new(), Compression::fast());
-    writer.write_all(inner).expect("memory can be written to");
-    writer.finish().expect("memory can be written to")
 }
 
 /// Returns an SPZ file of version 4.

@@ -1,7 +1,7 @@
 //! Archives of the SOG family that no exporter writes.
 //!
-//! In: an exported SOG. Out: the same textures with the `meta.json` of `.sog4d`, TSOG, `.sogst` on curved paths, version 1, and of levels of detail.
-//! Textures of motion and of lifespans are copies of others.
+//! In: an exported SOG. Out: the same textures with the `meta.json` of `.sog4d`, TSOG, `.sogst` on curved paths,
+//! version 1, and of levels of detail. Textures of motion and of lifespans are copies of others.
 
 use super::exported::exported;
 use super::{packed, unpacked};
@@ -65,7 +65,8 @@ pub fn sog4d() -> Vec<Vec<u8>> {
     });
     let files = ["times_l.webp", "times_u.webp"];
     let linear = json!({
-        "encoding": "quantize16", "center_min": 1.0, "center_max": 3.0, "scale_min": -3.0, "scale_max": 0.0, "files": files,
+        "encoding": "quantize16", "center_min": 1.0, "center_max": 3.0, "scale_min": -3.0, "scale_max": 0.0,
+        "files": files,
     });
     let copies = [MOTION, TIMES].concat();
     vec![Sog::of(0).with(fields(coded), &copies), Sog::of(1).with(fields(linear), &copies)]
@@ -115,7 +116,10 @@ pub fn curved() -> Vec<u8> {
 /// Returns a SOG of version 1.
 pub fn first() -> Vec<u8> {
     let sog = Sog::of(1);
-    let narrow = |least: f64, most: f64, file: &str, channels: usize| json!({ "mins": vec![least; channels], "maxs": vec![most; channels], "files": [file] });
+    let narrow = |least: f64, most: f64, file: &str, channels: usize| {
+        let [mins, maxs] = [least, most].map(|value| vec![value; channels]);
+        json!({ "mins": mins, "maxs": maxs, "files": [file] })
+    };
     let mut means = sog.meta["means"].clone();
     means["shape"] = json!([sog.meta["count"], 3]);
     let fields = json!({
