@@ -1,16 +1,17 @@
-# Common code of `.ci/run` and `.ci/full`. In: one of these scripts, which sources this file. Out: the root of the clone as working directory,
-# missing programs installed, functions for steps, lints and tests, and at the end a summary and the exit code.
+# Common code of `.ci/run` and `.ci/full`. In: one of these scripts, which sources this file. Out: the root of the clone
+# as working directory, missing programs installed, functions for steps, lints and tests, and at the end a summary and the
+# exit code.
 #
 # CARGO_TARGET_DIR  build folder; default: a folder of the user's cache, outside the clone, which the next run uses again
-# GS4D_DATA         folder of the trained captures; default: ../shared/data if it exists, else the tests that need captures are skipped
+# GS4D_DATA         folder of the trained captures; default: ../shared/data if it exists, else tests on captures are skipped
 #
 # Tests add a line for each skipped test to the file that GS4D_SKIPPED names, which is set here; the summary counts these lines.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 exec </dev/null
 
-# The features that can be built separately, without and with Bevy. `default` implies `bevy`; `openxr` is not tested; `web` is for wasm32, where the
-# pages are built with it.
+# The features that are built separately, without and with Bevy. Left out are `default`, which implies `bevy`, `openxr`,
+# which is not tested, and `web`, with which `.ci/web` builds the pages for wasm32.
 without_bevy=(renderer offline fourdgs cli)
 with_bevy=(bevy pbr picking testing inspector viewer)
 # The features that all tests, examples and documents together need.
@@ -22,8 +23,8 @@ began=0
 summary=()
 export GS4D_SKIPPED="$scratch/skipped"
 
-# Lists the reasons of skipped tests, and of skipped parts of tests, with their counts; a test that ran twice counts once. In: lines
-# `skipped: NAME: reason`.
+# Lists the reasons of skipped tests, and of skipped parts of tests, with their counts; a test that ran twice counts once.
+# In: lines `skipped: NAME: reason`.
 skips() {
   printf '    skipped tests and parts of tests, by reason:\n'
   if [ -s "$GS4D_SKIPPED" ]; then
@@ -142,7 +143,7 @@ prepare() {
   export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-${XDG_CACHE_HOME:-$HOME/.cache}/bevy_gs4d/target}"
   # Incremental builds only save time if one tree is built repeatedly.
   export CARGO_INCREMENTAL=0
-  # Cargo would reuse builds of another clone whose files are newer, but those tests read their data from that clone.
+  # Cargo would reuse builds of another clone whose files are newer, but their tests read data from that clone.
   if [ -d "$CARGO_TARGET_DIR" ] && [ "$(cat "$CARGO_TARGET_DIR/clone" 2>/dev/null)" != "$PWD" ]; then
     show cargo clean --locked --package bevy_gs4d
     show cargo clean --locked --package bevy_gs4d --release

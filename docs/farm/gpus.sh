@@ -1,11 +1,12 @@
 #!/bin/bash
-# Scores with several GPUs of one host, a shard on each. In: the number of GPUs, the scores to write, and the arguments of `gs4d score` but
-# --adapter, --shard and --out. Out: the scores; the parts beside them, from which the same call resumes.
+# Scores with several GPUs of one host, a shard on each. In: the number of GPUs, the file of scores to write, and the
+# arguments of `gs4d score` except --adapter, --shard and --out. Out: the scores, and beside them the parts, from which the
+# same call resumes.
 #
 #   bash docs/farm/gpus.sh 4 energy.f32 chkpnt30000.pth --data data/toybox --variant energy --engine gpu
 #
-# `--adapter` takes the number of a GPU: Vulkan does not follow CUDA_VISIBLE_DEVICES. GS4D_ADAPTERS lists other numbers, for hosts whose first
-# adapters are of other kinds: GS4D_ADAPTERS='1 2 3 4'.
+# `--adapter` takes the number of a GPU, since Vulkan ignores CUDA_VISIBLE_DEVICES. GS4D_ADAPTERS lists the numbers, for
+# hosts whose first adapters are not these GPUs: GS4D_ADAPTERS='1 2 3 4'.
 set -euo pipefail
 count=$1 out=$2
 shift 2

@@ -5,9 +5,9 @@
     run.py PLAN.json ID...      these jobs
     run.py FOLDER I/N           all jobs of every N-th plan of the folder, by name, from plan I on: share I of N, from 0
 
-In: plans; `gs4d` in the PATH. Out: the outputs of the jobs; the exit code of a job that fails, or 128 + signal if a signal has ended it. A plan
-whose job fails does not keep the others of its share from running; a signal does. A job whose results are stored ends at once: the same call
-again resumes.
+In: plans; `gs4d` in the PATH. Out: the outputs of the jobs; the exit code of a job that fails, or 128 + signal if a
+signal has ended it. After a job that fails the other plans of the share still run, after a signal they do not. A job
+whose results are stored ends at once: the same call resumes.
 """
 
 import json

@@ -3,10 +3,11 @@
 #
 #   sbatch --array=0-199%8 docs/farm/slurm.sh plans
 #
-# With as many tasks as plans each bakes one capture; with fewer, which suits captures of seconds, several. The array begins with 0.
-# Add what the captures need: --gres=gpu:1 --mem=16G --time=2:00:00, as `needs` of the plans says. A task that a signal has ended goes back to
-# the queue at most five times and resumes; a task that gs4d refuses, with code 2, does not. GS4D_FARM is the folder of run.py, if the
-# array is not submitted from the clone. Slurm starts a task again after the time `cred_expire` of its `AuthInfo`, 120 seconds unless set.
+# With as many tasks as plans each task bakes one capture; with fewer, for captures that take seconds, several. The array
+# must begin with 0. Add the needs of the captures, which `needs` in the plans has: --gres=gpu:1 --mem=16G --time=2:00:00. A
+# task that a signal has ended returns to the queue at most five times and resumes; a task that gs4d refuses, with code 2,
+# does not. GS4D_FARM is the folder of run.py, if the array is not submitted from the clone. Slurm starts a task again after
+# the time `cred_expire` of its `AuthInfo`, by default 120 seconds.
 #SBATCH --job-name=gs4d --requeue --open-mode=append
 python3 "${GS4D_FARM:-docs/farm}/run.py" "$1" "$SLURM_ARRAY_TASK_ID/$SLURM_ARRAY_TASK_COUNT"
 code=$?
