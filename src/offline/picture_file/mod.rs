@@ -3,7 +3,7 @@
 //! In: a path, and the largest size that the picture may have. Out: the picture, or a [`PictureError`] that names the
 //! file, the reason and the remedy.
 //!
-//! The size is compared before decoding, with the expected one and with the [`Budget`] of the file, so that a small
+//! The size is compared before decoding, with the expected one and with the `Budget` of the file, so that a small
 //! file cannot take much time and memory. Of a PNG the decoder gets only the chunks that change pixels (`png`); of an
 //! EXR all channels count (`exr_size`). A JPEG must be complete, which its decoder does not check (`jpeg`).
 

@@ -139,7 +139,7 @@ impl Scorer {
     }
 }
 
-/// A scene on the GPU, prepared for scoring. Its CPU reference is [`CpuEngine`](super::CpuEngine).
+/// A scene on the GPU, prepared for scoring. Its CPU reference is [`CpuEngine`](super::engine::CpuEngine).
 #[derive(Debug)]
 pub struct GpuEngine<'a> {
     headless: &'a mut Headless,

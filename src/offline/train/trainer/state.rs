@@ -11,7 +11,7 @@ use crate::scene::TemporalFilter;
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct TrainerState {
     /// Raw parameters, their first and their second moments; the same of the color coefficients; then the buffers of
-    /// the optional parts, in the order of their [list](crate::offline::train::parts): of those with parameters of
+    /// the optional parts, in the order of their list `PARTS`: of those with parameters of
     /// their own these and both moments, of others what they add up.
     pub buffers: Vec<Vec<u8>>,
     /// The neighbors of each Gaussian; empty if no term needs them.
