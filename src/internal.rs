@@ -128,10 +128,12 @@ pub mod offline {
     /// Of `train`.
     pub mod train {
         pub use crate::offline::train::gpu::{sample::*, totals::*};
-        pub use crate::offline::train::parts::{PART_SHADERS, regularizer::TermWeights, request::*};
+        pub use crate::offline::train::parts::{
+            PART_SHADERS, regularizer::TermWeights, request::*, standing::StandingUniforms,
+        };
         pub use crate::offline::train::reference::{
             adam::*, cloning::*, dropout::*, environment_backward::*, exposure::*, loss::*, neighbors::*, noise::*,
-            relocation::*, terms::*,
+            relocation::*, standing::*, terms::*,
         };
         pub use crate::offline::train::trainer::{state::*, step::*};
         pub use crate::offline::train::{densification::*, schedule::*, *};

@@ -14,6 +14,7 @@
 //! ```
 
 pub(crate) mod alpha;
+pub(crate) mod axes;
 pub(crate) mod conic;
 pub(crate) mod eigen;
 pub(crate) mod gradient;

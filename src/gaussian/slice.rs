@@ -140,7 +140,9 @@ impl Parameters {
                 let sigma = m * m.transpose();
                 let (a, c, v) = (DMat3::from_mat4(sigma), sigma.w_axis.truncate(), sigma.w_axis.w);
                 let outer = DMat3::from_cols(c * c.x, c * c.y, c * c.z);
-                (a - outer * v.recip(), c / v, v + prefilter)
+                // Equal quaternions give a Gaussian at rest: what rounding leaves of its velocity costs bits in a package.
+                let is_at_rest = self.rotation_l[index] == self.rotation_r[index];
+                (a - outer * v.recip(), if is_at_rest { DVec3::ZERO } else { c / v }, v + prefilter)
             }
             Model::Unrotated4d => {
                 // The original uses the temporal scale as the variance here, not squared.

@@ -11,7 +11,7 @@ use bevy_gs4d::internal::offline::engine::{
     AdamUniforms, DropoutUniforms, ExposureUniforms, FIRST_SEEN, LossUniforms, NoiseUniforms, RelocationUniforms,
     RoundingRecord, TiedColors, TrainedRecord, TrainedScene,
 };
-use bevy_gs4d::internal::offline::train::{NEIGHBORS, TermWeights};
+use bevy_gs4d::internal::offline::train::{NEIGHBORS, StandingUniforms, TermWeights};
 use bevy_gs4d::internal::renderer::COPIED_INSTANCE;
 use bevy_gs4d::internal::renderer::{
     self, Activation, BLOCK, Counters, DIGITS, FrameUniforms, INSTANCE_STRIDE, INSTANCES_AT_ONCE, InstanceUniforms,
@@ -77,7 +77,7 @@ fn splat() -> Mirror {
     in_fours(mirror, "SplatRecord", ["place", "shape", "color", ""])
 }
 
-fn mirrors() -> [Mirror; 21] {
+fn mirrors() -> [Mirror; 22] {
     [
         gaussian(),
         mirror!(InstanceUniforms {
@@ -154,6 +154,7 @@ fn mirrors() -> [Mirror; 21] {
         mirror!(ExposureUniforms { background, size, tiles, share, pull, camera, padding }),
         mirror!(TiedColors { count, stride, stages, padding }),
         mirror!(AdamUniforms { rates, correction, count, stride, values, padding, end }),
+        mirror!(StandingUniforms { middle, least_scale_t, log_scale_t, stride }),
         mirror!(TermWeights { motion, rigid, opacity, scale, falloff }),
         mirror!(NoiseUniforms { count, seed, strength, least_log_scale_t }),
         mirror!(DropoutUniforms { count, seed, below, first }),

@@ -22,9 +22,10 @@ pub(crate) struct TrainingArgs {
     rigid_weight: f64,
     /// Train an exposure for each camera: gains, mixtures and offsets of red, green and blue, for pictures whose
     /// cameras differ in exposure or white balance. OUT has the mean exposure of the training cameras; exposures are
-    /// not stored in it, and no evaluation uses them.
-    #[arg(long)]
-    exposure: bool,
+    /// not stored in it, and no evaluation uses them [default: on in training from pictures of several cameras that
+    /// stand still, else off].
+    #[arg(long, value_name = "SWITCH", require_equals = true, num_args = 0..=1, default_missing_value = "on", value_parser = values::switch())]
+    pub exposure: Option<bool>,
     /// Background of images with transparent pixels: random, a random color for each view, or fixed, the background of
     /// training.
     #[arg(long, value_name = "WHAT", default_value = "random", value_parser = values::one_of(&BEHIND))]
@@ -50,7 +51,7 @@ impl TrainingArgs {
                 rigid: self.rigid_weight,
                 ..Terms::default()
             },
-            exposure: self.exposure,
+            exposure: self.exposure.unwrap_or(false),
             behind: self.behind,
             patience: self.patience,
             seed: self.seed,

@@ -77,6 +77,18 @@ pub(crate) fn count(most: u64) -> RangedU64ValueParser<usize> {
     RangedU64ValueParser::new().range(1..=most)
 }
 
+/// Returns a parser for a whole number from 0 to `most`.
+pub(crate) fn count_or_none(most: u64) -> RangedU64ValueParser<usize> {
+    RangedU64ValueParser::new().range(0..=most)
+}
+
+/// Returns a parser for `on` or `off`.
+pub(crate) fn switch() -> impl TypedValueParser<Value = bool> {
+    one_of(&SWITCH)
+}
+
+const SWITCH: [(&str, bool); 2] = [("on", true), ("off", false)];
+
 /// Returns a parser for one of a few names, each of which stands for a value.
 pub(crate) fn one_of<T>(choices: &'static [(&'static str, T)]) -> impl TypedValueParser<Value = T>
 where

@@ -11,7 +11,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 /// The bars of the unfinished tasks; hidden with `--json` and if standard error is not a terminal. They are removed
 /// when this value is dropped. Default: no tasks.
 #[derive(Default)]
-pub(crate) struct Bars(Vec<ProgressBar>);
+pub(crate) struct Bars(Vec<(ProgressBar, &'static str)>);
 
 impl Progress for Bars {
     fn begin(&mut self, task: &'static str, steps: usize) {
@@ -23,17 +23,23 @@ impl Progress for Bars {
         if steps > 0 {
             bar.tick();
         }
-        self.0.push(bar);
+        self.0.push((bar, task));
     }
 
     fn advance(&mut self) {
-        if let Some(bar) = self.0.last() {
+        if let Some((bar, _)) = self.0.last() {
             bar.inc(1);
         }
     }
 
+    fn show(&mut self, words: &str) {
+        if let Some((bar, task)) = self.0.last() {
+            bar.set_message(format!("{task}, {words}"));
+        }
+    }
+
     fn finish(&mut self) {
-        if let Some(bar) = self.0.pop() {
+        if let Some((bar, _)) = self.0.pop() {
             bar.finish_and_clear();
         }
     }

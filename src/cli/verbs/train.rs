@@ -14,12 +14,13 @@ use crate::cli::output::table::{bytes, lines};
 use crate::offline::dataset::gaps::have_gaps;
 use crate::offline::dataset::{Splits, Validation};
 use crate::offline::engine::AdapterDescription;
+use crate::offline::footage::{is_raw, prepared};
 use crate::offline::measure::belonging::require_belonging_on_gpu;
 use crate::offline::store::outputs::Files;
 use crate::offline::store::results::Store;
 use crate::offline::train::{
-    CaptureSettings, Cloning, FineTuneSettings, FineTuned, Growth, Rates, Start, StartSettings, Terms, TrainSettings,
-    TrainedCapture, Training,
+    Births, CaptureSettings, Cloning, FineTuneSettings, FineTuned, Floaters, Growth, Rates, Start, StartSettings,
+    Terms, TrainSettings, TrainedCapture, Training, Usual,
 };
 use serde_json::json;
 use std::path::PathBuf;
@@ -68,9 +69,10 @@ pub(crate) struct Train {
     /// Background color, 0 to 1 in the space of the pictures.
     #[arg(long, value_name = "R,G,B", default_value = "0,0,0", value_parser = values::color, allow_hyphen_values = true)]
     background: [f32; 3],
-    /// Number of Gaussians; with --densify original the most that there are at any step.
-    #[arg(long, value_name = "N", default_value = "60000", value_parser = values::count(100_000_000))]
-    gaussians: usize,
+    /// Number of Gaussians; with --densify original the most that there are at any step [default: 60000; for cameras
+    /// that stand still and see the same moments one for 32 pixels of a moment, up to 400000].
+    #[arg(long, value_name = "N", value_parser = values::count(100_000_000))]
+    gaussians: Option<usize>,
     /// Where Gaussians are placed at the beginning: hull, inside the silhouettes of the images; points, at those of the
     /// dataset (`points3D` of COLMAP, `ply_file_path` of `transforms.json`, `points3d.ply` beside
     /// `transforms_train.json`); random, in the box that the cameras look at; or auto: the first of these that the
@@ -95,9 +97,9 @@ pub(crate) struct Train {
     /// color, else 0].
     #[arg(long, value_name = "ROWS", value_parser = clap::value_parser!(u32).range(0..=4096))]
     environment: Option<u32>,
-    /// Number of training steps.
-    #[arg(long, value_name = "N", default_value = "20000", value_parser = values::count(100_000_000))]
-    steps: usize,
+    /// Number of training steps [default: 20000].
+    #[arg(long, value_name = "N", value_parser = values::count(100_000_000))]
+    steps: Option<usize>,
     /// Factor on all rates at the last step. The factor falls from 1; 1 keeps the rates constant.
     #[arg(long, value_name = "FACTOR", default_value = "0.2", value_parser = values::share)]
     last_rate: f64,
@@ -123,6 +125,24 @@ pub(crate) struct Train {
     /// and large ones, and resets opacities.
     #[arg(long, value_name = "HOW", default_value = "relocate", value_parser = values::one_of(&DENSIFY))]
     densify: Densify,
+    /// Most Gaussians that begin anew, three for each, where several cameras of one moment see the same error, such as a
+    /// small thing that moves fast; 0: none.
+    #[arg(long, help_heading = "Experimental", value_name = "N", default_value = "0", value_parser = values::count_or_none(100_000))]
+    births: usize,
+    /// Remove Gaussians close before cameras that few others see.
+    #[arg(long, help_heading = "Experimental", value_name = "SWITCH", default_value = "off", action = clap::ArgAction::Set, value_parser = values::switch())]
+    floaters: bool,
+    /// Keep Gaussians that begin at points without a time, beside points with one, as points of what stands still: without
+    /// motion and change. A package of them is smaller, and shows less of other views.
+    #[arg(long, help_heading = "Experimental", value_name = "SWITCH", default_value = "off", action = clap::ArgAction::Set, value_parser = values::switch())]
+    standing: bool,
+    /// Begin with the velocities of points that have some.
+    #[arg(long, help_heading = "Experimental", value_name = "SWITCH", default_value = "off", action = clap::ArgAction::Set, value_parser = values::switch())]
+    start_velocity: bool,
+    /// Train on a quarter of the size of each side at first, then on half, where the longer side of pictures has more
+    /// than 1000 pixels.
+    #[arg(long, value_name = "SWITCH", default_value = "on", action = clap::ArgAction::Set, value_parser = values::switch())]
+    coarse: bool,
     /// Steps between two relocations of the Gaussians that have faded; 0: none is relocated.
     #[arg(long, value_name = "N", default_value = "100")]
     relocate_every: usize,
@@ -175,11 +195,21 @@ impl Train {
     /// # Errors
     /// Views that cannot be used, a package that cannot be written, a failure of the GPU.
     pub(crate) fn run(&self) -> Result<Report, Failure> {
-        self.check_options()?;
         let out = self.package.checked_file(self.data.add_to(Files::default()).reads(&self.points))?;
         let store = Store::beside(out, ".train")?;
         let progress = &mut Bars::default();
-        let settings = self.settings();
+        let data = match !self.data.is_static && is_raw(&self.data.data) {
+            true => prepared(&self.data.data, out, progress)?,
+            false => self.data.data.clone(),
+        };
+        let usual = Usual::read(&data, &self.data.options(self.validation), progress)?;
+        let usual = Usual {
+            gaussians: self.gaussians.unwrap_or(usual.gaussians),
+            steps: self.steps.unwrap_or(usual.steps),
+            ..usual
+        };
+        self.check_options(&usual)?;
+        let settings = self.settings(data, &usual);
         let training = Training::open(&settings, progress)?;
         let Splits { train, validation, .. } = training.splits();
         self.given.require(Need::ValidationViews, !validation.is_empty())?;
@@ -250,28 +280,30 @@ impl Train {
     }
 
     /// Checks that every option has an effect.
-    fn check_options(&self) -> Result<(), Failure> {
+    fn check_options(&self, usual: &Usual) -> Result<(), Failure> {
         let relocates = self.densify == Densify::Relocate;
         let needs = [
             (Need::ValidationViews, self.validation != Validation::None),
             (Need::Relocation, relocates),
             (Need::FixedNumber, relocates),
             (Need::StartAtPoints, !matches!(self.start, Start::Hull | Start::Random)),
-            (Need::CheckedSteps, self.steps >= CHECKED),
+            (Need::CheckedSteps, usual.steps >= CHECKED),
             (Need::Degrees, self.sh_degree > 0),
             (Need::ColorInTime, self.sh_degree >= 3),
         ];
         needs.into_iter().try_for_each(|(need, is_met)| self.given.require(need, is_met))
     }
 
-    fn start_settings(&self) -> StartSettings {
+    fn start_settings(&self, usual: &Usual) -> StartSettings {
         StartSettings {
             gaussians: match self.densify {
-                Densify::Relocate => self.gaussians,
-                Densify::Original => Cloning::first(self.gaussians),
+                Densify::Relocate => usual.gaussians,
+                Densify::Original => Cloning::first(usual.gaussians),
             },
             start: if self.points.is_some() { Start::Points } else { self.start },
             time_scale: self.time_scale,
+            velocities: self.start_velocity,
+            standing: self.standing,
             seed: self.training.seed,
             degree: self.sh_degree,
             degree_t: self.sh_degree_t.unwrap_or(2),
@@ -279,9 +311,9 @@ impl Train {
         }
     }
 
-    fn settings(&self) -> TrainSettings {
+    fn settings(&self, data: PathBuf, usual: &Usual) -> TrainSettings {
         TrainSettings {
-            data: self.data.data.clone(),
+            data,
             splits: self.data.options(self.validation),
             capture: CaptureSettings {
                 time_interval: self.time_interval,
@@ -289,26 +321,26 @@ impl Train {
                 duration_seconds: self.duration,
                 ..CaptureSettings::default()
             },
-            start: self.start_settings(),
+            start: self.start_settings(usual),
             points: self.points.clone(),
-            tuning: self.tuning(),
+            tuning: self.tuning(usual),
             save_every: self.save_every,
         }
     }
 
-    fn tuning(&self) -> FineTuneSettings {
+    fn tuning(&self, usual: &Usual) -> FineTuneSettings {
         let shared = self.training.settings();
         let (growth, weight) = match self.densify {
             Densify::Relocate => {
                 let relocate_every = (self.relocate_every > 0).then_some(self.relocate_every);
                 let (noise, dropout) = (self.noise, self.dropout);
-                (Growth { relocate_every, noise, dropout, ..Growth::over(self.steps) }, 0.01)
+                (Growth { relocate_every, noise, dropout, ..Growth::over(usual.steps) }, 0.01)
             }
-            Densify::Original => (Growth::original(self.steps, self.gaussians), 0.0),
+            Densify::Original => (Growth::original(usual.steps, usual.gaussians), 0.0),
         };
         let (opacity, scale) = (self.opacity_weight.unwrap_or(weight), self.scale_weight.unwrap_or(weight));
-        FineTuneSettings {
-            steps: self.steps,
+        let tuning = FineTuneSettings {
+            steps: usual.steps,
             rates: Rates { mean: Rates::OURS.mean * self.mean_rate, ..Rates::OURS },
             last_rate: self.last_rate,
             similarity_share: self.similarity,
@@ -321,6 +353,23 @@ impl Train {
                 ..growth
             }),
             ..shared
+        };
+        self.with_parts(usual.with_parts(tuning))
+    }
+
+    /// Returns the settings with the parts that options ask for.
+    fn with_parts(&self, tuning: FineTuneSettings) -> FineTuneSettings {
+        let growth = |growth: Growth| Growth {
+            births: (self.births > 0).then(|| Births { most: self.births, ..Births::over(tuning.steps) }),
+            floaters: self.floaters.then(|| Floaters::over(tuning.steps)),
+            ..growth
+        };
+        FineTuneSettings {
+            exposure: self.training.exposure.unwrap_or(tuning.exposure),
+            standing: self.standing,
+            coarse: tuning.coarse.filter(|_| self.coarse),
+            growth: tuning.growth.map(growth),
+            ..tuning
         }
     }
 }
@@ -339,7 +388,14 @@ mod tests {
     #[test]
     fn without_options_the_settings_are_the_usual_ones() {
         let command = Command::try_parse_from(["train", "--data", "d", "-o", "o.gs4d"]).expect("both paths are given");
-        let (settings, splits) = (command.train.settings(), command.train.data.options(Validation::Auto));
-        assert_eq!(settings, TrainSettings::usual("d".into(), splits), "a bake trains with the same settings");
+        let splits = command.train.data.options(Validation::Auto);
+        for usual in [Usual::PLAIN, Usual { gaussians: 90_000, steps: 30_000, is_rig: true }] {
+            let settings = command.train.settings("d".into(), &usual);
+            assert_eq!(
+                settings,
+                TrainSettings::usual("d".into(), splits, &usual),
+                "a bake trains with the same settings"
+            );
+        }
     }
 }

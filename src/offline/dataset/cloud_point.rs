@@ -1,6 +1,6 @@
 //! A point that a training may begin with.
 //!
-//! In: its place, color and time in a file, in double precision. Out: a [`CloudPoint`], counted from an origin.
+//! In: its place, color, time and velocity in a file, in double precision. Out: a [`CloudPoint`], counted from an origin.
 
 use crate::scene::Origin;
 use glam::{DVec3, Vec3};
@@ -14,6 +14,8 @@ pub struct CloudPoint {
     pub color: Option<Vec3>,
     /// In the unit of timestamps; `None` if the file has no times.
     pub time: Option<f32>,
+    /// World units for each unit of timestamps; zero if the file has no velocities.
+    pub velocity: Vec3,
 }
 
 impl CloudPoint {
@@ -23,6 +25,7 @@ impl CloudPoint {
             position: (DVec3::from(place) - DVec3::from(origin.place)).as_vec3(),
             color,
             time: time.map(|time| (time - origin.time) as f32),
+            velocity: Vec3::ZERO,
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Points to begin a training with.
 //!
-//! In: a file of points: PLY (`x`, `y`, `z`, optionally `red`, `green`, `blue` and `time`), COLMAP's `points3D.bin` and
+//! In: a file of points: PLY (`x`, `y`, `z`, optionally `red`, `green`, `blue`, `time`, `vx`, `vy`, `vz`
+//! and `standing`), COLMAP's `points3D.bin` and
 //! `points3D.txt`, `points.npy` of Nerfies, or `init_pt_cld.npz` of `PanopticSports`; the origin of the views. Out: a
 //! [`PointCloud`]. Points whose place or time is not finite are left out. A count in a file is used only if the file
 //! has as many bytes.
@@ -51,11 +52,16 @@ fn ply(path: &Path, origin: &Origin) -> Result<Vec<CloudPoint>, DatasetError> {
     let table = vertices(&bytes).map_err(faulty)?;
     let places = table.all(["x", "y", "z"]).map_err(faulty)?;
     let colors = table.all(["red", "green", "blue"]).ok();
-    let time = table.column("time");
+    let (time, standing) = (table.column("time"), table.column("standing"));
+    let velocities = table.all(["vx", "vy", "vz"]).ok();
     let point = |index: usize| {
         let color = colors.map(|columns| color(columns.map(|column| column.share(index))));
-        let time = time.map(|column| column.f64(index));
-        CloudPoint::counted_from(origin, places.map(|column| column.f64(index)), color, time)
+        // A point that stands has no time, whatever its row says.
+        let stands = standing.is_some_and(|column| column.f64(index) > 0.0);
+        let time = time.filter(|_| !stands).map(|column| column.f64(index));
+        let velocity = velocities.map_or(Vec3::ZERO, |columns| Vec3::from(columns.map(|column| column.f32(index))));
+        let point = CloudPoint::counted_from(origin, places.map(|column| column.f64(index)), color, time);
+        CloudPoint { velocity: if velocity.is_finite() { velocity } else { Vec3::ZERO }, ..point }
     };
     Ok((0..table.len()).map(point).collect())
 }

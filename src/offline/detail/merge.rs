@@ -12,8 +12,8 @@
 //! 3. Absorption is kept: a splat of opacity `o` and area `A` absorbs `A Li₂(o)`, the integral of `−ln(1 − o g)`. Areas
 //!    are areas on the screen, with the low-pass.
 
-use super::rotation::Axes;
 use crate::gaussian::alpha::{ALPHA_MAX, ALPHA_MIN};
+use crate::gaussian::axes::Axes;
 use crate::gaussian::conic::LOW_PASS;
 use crate::gaussian::harmonics::time_cosine;
 use crate::gaussian::{Gaussian, Harmonics, Parameters, lifespan_reach};

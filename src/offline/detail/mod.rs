@@ -21,7 +21,6 @@ mod fit;
 mod looks;
 mod maker;
 mod merge;
-mod rotation;
 mod settings;
 
 pub use error::DetailError;

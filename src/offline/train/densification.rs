@@ -2,7 +2,8 @@
 //!
 //! In: the number of steps. Out: [`Growth`]: the steps after which Gaussians are relocated, the strength of the noise,
 //! the share that is hidden, how the rate of means falls, when the degrees of color rise; [`Cloning`]: the steps after
-//! which Gaussians are cloned, split and removed as in the original. What happens then is in the
+//! which Gaussians are cloned, split and removed as in the original; [`Births`] and [`Floaters`]: the steps after which
+//! what several cameras miss is added, and what hangs before single cameras is hidden. What happens then is in the
 //! [CPU references](super::reference).
 
 use crate::gaussian::harmonics::evaluated;
@@ -41,6 +42,39 @@ pub struct Growth {
     pub least_time_scale: f64,
     /// The densification of the original, in place of relocation; `None`, the default: the number of Gaussians stays.
     pub cloning: Option<Cloning>,
+    /// Births of Gaussians where several cameras of a moment see an error; `None`, the default: there are none.
+    pub births: Option<Births>,
+    /// Removal of Gaussians that hang before single cameras; `None`, the default: they stay.
+    pub floaters: Option<Floaters>,
+}
+
+/// Births of Gaussians where several cameras of one moment see that something is missing: small things that move fast
+/// are lost by all other changes, which begin with Gaussians that are there. They need at least three cameras at the
+/// same moments.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Births {
+    /// Steps between two searches. Default: 500, and at most a twentieth of all.
+    pub every: usize,
+    /// The first step after which there is one. Default: a twentieth of all.
+    pub from: usize,
+    /// The last such step. Default: seven tenths of all.
+    pub until: usize,
+    /// Moments of a search, one after the other; the next search continues after them. Default: 3.
+    pub moments: usize,
+    /// Most births of a search, each of three Gaussians. Default: 200.
+    pub most: usize,
+}
+
+/// Removal of Gaussians that are close before a camera and seen by few: they are hidden, and relocated or removed as
+/// others that have faded. It needs at least three cameras at the same moments.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Floaters {
+    /// Steps between two searches. Default: 1000, and at most a tenth of all.
+    pub every: usize,
+    /// The first step after which there is one. Default: a tenth of all.
+    pub from: usize,
+    /// The last such step. Default: five sixths of all, as that of relocation.
+    pub until: usize,
 }
 
 /// The densification of the original 4DGS, within a fixed number of places: Gaussians with large gradients on the
@@ -73,6 +107,8 @@ impl Growth {
             dropout: 0.1,
             least_time_scale: 0.0,
             cloning: None,
+            births: None,
+            floaters: None,
         }
     }
 
@@ -104,6 +140,36 @@ impl Growth {
         let rises = step / self.raise_every.max(1);
         let degree = rises.min(DEGREE);
         3 * evaluated(degree as u32, (rises - degree).min(DEGREE_T) as u32) as u32
+    }
+}
+
+impl Births {
+    /// Returns the defaults for this number of steps.
+    pub fn over(steps: usize) -> Self {
+        Self { every: 500.min(steps / 20).max(1), from: steps / 20, until: steps / 10 * 7, moments: 3, most: 200 }
+    }
+
+    /// Returns whether there is a search after this number of steps.
+    pub(crate) fn is_due_after(&self, step: usize) -> bool {
+        step > 0 && step.is_multiple_of(self.every.max(1)) && (self.from..=self.until).contains(&step)
+    }
+
+    /// Returns the number of the search after this number of steps, from 0.
+    pub(crate) fn number(&self, step: usize) -> usize {
+        let every = self.every.max(1);
+        (step / every).saturating_sub(self.from.max(1).div_ceil(every))
+    }
+}
+
+impl Floaters {
+    /// Returns the defaults for this number of steps.
+    pub fn over(steps: usize) -> Self {
+        Self { every: 1000.min(steps / 10).max(1), from: steps / 10, until: steps / 6 * 5 }
+    }
+
+    /// Returns whether there is a search after this number of steps.
+    pub(crate) fn is_due_after(&self, step: usize) -> bool {
+        step > 0 && step.is_multiple_of(self.every.max(1)) && (self.from..=self.until).contains(&step)
     }
 }
 
@@ -158,6 +224,20 @@ mod tests {
         assert_eq!((steps.first(), steps.last(), steps.len()), (Some(&500), Some(&10_000), 96), "every hundred steps");
         let never = Growth { relocate_every: None, ..growth };
         assert!(!(0..12_000).any(|step| never.relocates_after(step)), "or never");
+    }
+
+    #[test]
+    fn searches_are_numbered_from_the_first() {
+        let births = Births::over(20_000);
+        let steps: Vec<usize> = (0..=20_000).filter(|&step| births.is_due_after(step)).collect();
+        assert_eq!((steps.first(), steps.last(), steps.len()), (Some(&1000), Some(&14_000), 27), "of births");
+        let numbers: Vec<usize> = steps.into_iter().map(|step| births.number(step)).collect();
+        assert_eq!(numbers, (0..27).collect::<Vec<_>>(), "one after the other");
+        let floaters = Floaters::over(20_000);
+        let steps: Vec<usize> = (0..=20_000).filter(|&step| floaters.is_due_after(step)).collect();
+        assert_eq!((steps.first(), steps.last(), steps.len()), (Some(&2000), Some(&16_000), 15), "of floaters");
+        let often = Births { every: 1, from: 0, ..births };
+        assert!(!often.is_due_after(0) && often.is_due_after(1) && often.number(1) == 0, "none before a step");
     }
 
     #[test]

@@ -5,17 +5,20 @@
 
 use super::densification::Growth;
 use super::error::TrainError;
+use super::every_view::{EveryView, every_view};
 use super::images::{ImageRoom, TrainingImages};
 use super::memory::require_room;
 use super::reference::terms::Terms;
 use super::results::{FineTuned, Resume};
 use super::schedule::Rates;
 use super::settings::FineTuneSettings;
+use super::start::seen::are_seen;
 use super::start::{CaptureSettings, Start, StartError, StartSettings, begin, capture_of};
 use super::train;
+use super::usual::Usual;
 use crate::offline::dataset::point_cloud::PointCloud;
 use crate::offline::dataset::selection::camera_numbers;
-use crate::offline::dataset::splits::{SplitOptions, Splits, origin_of};
+use crate::offline::dataset::splits::{SplitOptions, Splits};
 use crate::offline::dataset::{TrainingView, require_images, trained_pixel};
 use crate::offline::store::results::{Key, Store};
 use crate::offline::work::Progress;
@@ -43,8 +46,6 @@ pub struct TrainSettings {
 }
 
 impl TrainSettings {
-    /// The usual number of steps.
-    pub const STEPS: usize = 20_000;
     /// The usual factor on the rates of means, relative to those of fine-tuning.
     pub const MEAN_RATE: f64 = 4.0;
 
@@ -101,24 +102,20 @@ impl TrainSettings {
     /// Views that cannot be used, images that are missing.
     pub(crate) fn divide(&self, progress: &mut dyn Progress) -> Result<Divided, TrainError> {
         let Self { data, splits: options, capture, .. } = self;
-        let origin = origin_of(data, options, progress)?;
-        // Every time, before the interval is known.
-        let any_time =
-            TrainedWith { time_interval: [f32::NEG_INFINITY, f32::INFINITY], origin, ..TrainedWith::default() };
-        let all = Splits::open(data, options, &any_time, progress)?;
-        let views = all.all_training(&any_time, progress)?;
+        let EveryView { views, origin, clock } = every_view(data, options, progress)?;
         let capture = CaptureSettings { origin, ..*capture };
         let of_dataset = |reason| TrainError::Start { path: data.clone(), reason };
-        let (trained_with, playback) = capture_of(&views, &capture, all.clock).map_err(of_dataset)?;
+        let (trained_with, playback) = capture_of(&views, &capture, clock).map_err(of_dataset)?;
         let splits = Splits::open(data, options, &trained_with, progress)?;
         require_images(&splits.train)?;
         Ok(Divided { splits, views, trained_with, playback })
     }
 
-    /// Returns the usual settings for a dataset.
-    pub fn usual(data: PathBuf, splits: SplitOptions) -> Self {
-        let (capture, start) = (CaptureSettings::default(), StartSettings::default());
-        Self { data, splits, capture, start, points: None, tuning: Self::tuning(Self::STEPS), save_every: 5000 }
+    /// Returns the usual settings for a dataset, with its usual choices.
+    pub fn usual(data: PathBuf, splits: SplitOptions, usual: &Usual) -> Self {
+        let start = StartSettings { gaussians: usual.gaussians, ..StartSettings::default() };
+        let tuning = usual.with_parts(Self::tuning(usual.steps));
+        Self { data, splits, capture: CaptureSettings::default(), start, points: None, tuning, save_every: 5000 }
     }
 }
 
@@ -172,7 +169,17 @@ impl<'a> Training<'a> {
         let TrainSettings { start, tuning, .. } = settings;
         let Divided { splits, views, mut trained_with, playback } = settings.divide(progress)?;
         trained_with.validation = Some(splits.to_string());
-        let (cloud, of_cloud) = settings.cloud(splits.points.as_deref(), &trained_with.origin, progress)?;
+        let (mut cloud, of_cloud) = settings.cloud(splits.points.as_deref(), &trained_with.origin, progress)?;
+        if start.start == Start::Auto
+            && let Some(points) = cloud.take_if(|points| !are_seen(points, &views))
+        {
+            let PointCloud(points) = points;
+            let data = settings.data.display();
+            progress.note(&format!(
+                "note: {data}: most cameras see none of its {} points, which are not used (--start points uses them)",
+                points.len()
+            ));
+        }
         let key = Key::of_images(&splits.train, progress)?
             .with(of_cloud)
             .with(Key::of_images(&splits.validation, progress)?)
@@ -220,8 +227,8 @@ impl<'a> Training<'a> {
         TrainingImages::require_room(&splits.train, &splits.validation, headless)?;
         require_room(headless, capacity, start.degree, start.degree_t)?;
         let division = splits.to_string();
-        let images =
-            TrainingImages::load(splits.train, &splits.validation, &trained_with, ImageRoom::of_system(), progress)?;
+        let load = if tuning.coarse.is_some() { TrainingImages::load_first } else { TrainingImages::load };
+        let images = load(splits.train, &splits.validation, &trained_with, ImageRoom::of_system(), progress)?;
         let begun = begin(&images, trained_with, playback, start, cloud.as_ref());
         let (scene, started) = begun.map_err(|reason| TrainError::Start { path: data.clone(), reason })?;
         let resume = Resume { store, key, every: *save_every };

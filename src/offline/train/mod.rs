@@ -18,6 +18,7 @@
 //! | `start` | the scene before the first step |
 //! | `images` | the images to train on |
 //! | `settings`, `densification`, `schedule` | what a run is asked for, and what that says of each step |
+//! | `every_view`, `usual` | the views of the dataset, and what is chosen by them |
 //! | `phases` | the phases of a run: steps, evaluations, states; codebooks |
 //! | `trainer` | one step on the GPU |
 //! | `parts` | the optional parts of a step, behind one trait and in one list |
@@ -27,6 +28,7 @@
 
 pub(crate) mod densification;
 pub(crate) mod error;
+mod every_view;
 pub(crate) mod from_pictures;
 pub(crate) mod gpu;
 pub(crate) mod images;
@@ -41,14 +43,15 @@ pub(crate) mod start;
 pub(crate) mod trainer;
 pub(crate) mod trainer_error;
 pub(crate) mod untrainable;
+pub(crate) mod usual;
 
-pub(crate) use densification::Cloning;
 pub use densification::Growth;
+pub(crate) use densification::{Births, Cloning, Floaters};
 pub use error::TrainError;
 pub(crate) use from_pictures::Divided;
 pub use from_pictures::{TrainSettings, TrainedCapture, Training};
 pub(crate) use gpu::{GpuImage, Sample};
-pub use images::{ImageRoom, TrainingImages};
+pub use images::{Coarse, ImageRoom, TrainingImages};
 pub use phases::fine_tune;
 pub use reference::terms::Terms;
 pub use results::{CurvePoint, FineTuned, Resume};
@@ -57,6 +60,7 @@ pub use settings::FineTuneSettings;
 pub use start::{CaptureSettings, Start, StartError, StartSettings, begin, capture_of};
 pub(crate) use trainer::Trainer;
 pub use trainer_error::TrainerError;
+pub use usual::Usual;
 
 use super::work::Progress;
 use crate::renderer::Headless;

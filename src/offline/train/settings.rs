@@ -3,6 +3,7 @@
 //! In: the choices of a caller. Out: [`FineTuneSettings`], with a default for each; what they say of one step.
 
 use super::densification::Growth;
+use super::images::Coarse;
 use super::reference::terms::Terms;
 use super::schedule::{Behind, Rates, Step};
 use crate::gaussian::GradientMode;
@@ -26,6 +27,8 @@ pub struct FineTuneSettings {
     /// Whether a correction of color is trained for each camera: an exposure, which the scene does not have. Default:
     /// `false`.
     pub exposure: bool,
+    /// The sizes of the images during the steps; `None`, the default: always whole.
+    pub coarse: Option<Coarse>,
     /// What is behind images that do not cover all of their pixels.
     pub behind: Behind,
     /// Seed of the order of views and of random backgrounds.
@@ -46,6 +49,9 @@ pub struct FineTuneSettings {
     /// Whether these further steps see geometry as the package will hold it, rounded. Default: `false`; it pays with
     /// few bits.
     pub rounding: bool,
+    /// Whether native 4D Gaussians of a temporal scale of at least two time intervals are kept at rest, with the same
+    /// look at all times. Default: `false`.
+    pub standing: bool,
 }
 
 impl FineTuneSettings {
@@ -75,6 +81,7 @@ impl Default for FineTuneSettings {
             similarity_share: 0.1,
             terms: Terms::default(),
             exposure: false,
+            coarse: None,
             behind: Behind::default(),
             seed: 0,
             evaluate_every: 500,
@@ -84,6 +91,7 @@ impl Default for FineTuneSettings {
             growth: None,
             compress: None,
             rounding: false,
+            standing: false,
         }
     }
 }

@@ -17,6 +17,9 @@ pub trait Progress {
     /// Reports that one more step of the task is done.
     fn advance(&mut self);
 
+    /// Shows words beside the task until it is finished or others are shown, such as the quality so far.
+    fn show(&mut self, _words: &str) {}
+
     /// Finishes the task.
     fn finish(&mut self);
 

@@ -347,7 +347,12 @@ fn files_of_points_have_places_colors_and_times() {
     for (name, bytes, time) in files {
         folder.write(name, bytes);
         let PointCloud(points) = PointCloud::load(&folder.path().join(name), &Origin::default()).expect(name);
-        let expected = CloudPoint { position: Vec3::new(2.0, -1.5, 0.25), color: Some(Vec3::new(0.2, 0.4, 1.0)), time };
+        let expected = CloudPoint {
+            position: Vec3::new(2.0, -1.5, 0.25),
+            color: Some(Vec3::new(0.2, 0.4, 1.0)),
+            time,
+            velocity: Vec3::ZERO,
+        };
         assert_eq!(points, [expected], "{name}: one finite point");
     }
     let refused = [

@@ -171,6 +171,7 @@ fn colmap_points_are_those_of_pycolmap() {
             position,
             color: Some(Vec3::from(color.map(f32::from)) / 255.0),
             time: None,
+            velocity: Vec3::ZERO,
         };
         assert_eq!(found, cloud.iter().map(point).collect::<Vec<_>>(), "{name}: places and colors");
     }

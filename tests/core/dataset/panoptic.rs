@@ -133,8 +133,12 @@ fn points_have_places_and_colors() {
         let path = folder.write("init_pt_cld.npz", bytes);
         PointCloud::load(&path, &Origin::default()).map(|PointCloud(points)| points).map_err(|error| error.to_string())
     };
-    let expected =
-        CloudPoint { position: Vec3::new(1.0, -2.0, 0.5), color: Some(Vec3::new(0.2, 0.4, 1.0)), time: None };
+    let expected = CloudPoint {
+        position: Vec3::new(1.0, -2.0, 0.5),
+        color: Some(Vec3::new(0.2, 0.4, 1.0)),
+        time: None,
+        velocity: Vec3::ZERO,
+    };
     for scale in [1.0, 255.0] {
         let rows = [[1.0, -2.0, 0.5, 0.2 * scale, 0.4 * scale, scale, 1.0], [f64::NAN; 7]];
         let bytes: Vec<u8> = rows.as_flattened().iter().flat_map(|value| value.to_le_bytes()).collect();

@@ -3,10 +3,12 @@
 //! In: training views, the schedule of steps. Out: the images of a step. Threads decode those of the following steps
 //! meanwhile.
 
+use super::shot::Shot;
 use super::targets::{TrainingImages, ahead};
 use crate::offline::dataset::{CoveredImage, DatasetError};
 use crate::offline::train::schedule::Schedule;
 use std::collections::VecDeque;
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, sync_channel};
 
 /// An image that a thread reads.
@@ -14,13 +16,12 @@ use std::sync::mpsc::{Receiver, sync_channel};
 struct Ahead {
     step: usize,
     index: usize,
-    image: Receiver<Result<CoveredImage, DatasetError>>,
+    image: Receiver<Result<Arc<CoveredImage>, DatasetError>>,
 }
 
 /// The images that are being read, in the order in which they are needed.
 #[derive(Debug)]
-pub(crate) struct Prefetch<'a> {
-    images: &'a TrainingImages,
+pub(crate) struct Prefetch {
     /// Whether any image is not in memory.
     reads: bool,
     waiting: VecDeque<Ahead>,
@@ -28,14 +29,14 @@ pub(crate) struct Prefetch<'a> {
     next: usize,
 }
 
-impl<'a> Prefetch<'a> {
-    pub(crate) fn new(images: &'a TrainingImages) -> Self {
+impl Prefetch {
+    pub(crate) fn new(images: &TrainingImages) -> Self {
         let reads = images.shots.iter().any(|shot| shot.image.is_none());
-        Self { images, reads, waiting: VecDeque::new(), next: 0 }
+        Self { reads, waiting: VecDeque::new(), next: 0 }
     }
 
     /// Begins to read images of a step and of those after it.
-    pub(crate) fn follow(&mut self, schedule: &Schedule, step: usize) {
+    pub(crate) fn follow(&mut self, images: &TrainingImages, schedule: &Schedule, step: usize) {
         if !self.reads {
             return;
         }
@@ -49,8 +50,8 @@ impl<'a> Prefetch<'a> {
         let last = step + ahead();
         while self.waiting.len() < ahead() && self.next < last {
             for index in schedule.batch(self.next) {
-                if self.images.shots[index].image.is_none() {
-                    let image = self.read(index);
+                if images.shots[index].image.is_none() {
+                    let image = begin_to_read(images, index);
                     self.waiting.push_back(Ahead { step: self.next, index, image });
                 }
             }
@@ -58,25 +59,30 @@ impl<'a> Prefetch<'a> {
         }
     }
 
-    /// Begins to read an image on another thread.
-    fn read(&self, index: usize) -> Receiver<Result<CoveredImage, DatasetError>> {
-        let (sender, receiver) = sync_channel(1);
-        let view = self.images.views[index].clone();
-        rayon::spawn(move || {
-            // The receiver is gone after a jump to another step.
-            sender.send(view.load_covered()).ok();
-        });
-        receiver
-    }
-
     /// Returns an image of a step that is not in memory.
     ///
     /// # Errors
     /// An image that has become unreadable.
-    pub(crate) fn take(&mut self, step: usize, index: usize) -> Result<CoveredImage, DatasetError> {
+    pub(crate) fn take(
+        &mut self,
+        images: &TrainingImages,
+        step: usize,
+        index: usize,
+    ) -> Result<Arc<CoveredImage>, DatasetError> {
         let place = self.waiting.iter().position(|ahead| (ahead.step, ahead.index) == (step, index));
         let waiting = place.and_then(|place| self.waiting.remove(place));
         let read = waiting.and_then(|ahead| ahead.image.recv().ok());
-        read.unwrap_or_else(|| self.images.views[index].load_covered())
+        read.unwrap_or_else(|| images.image(index))
     }
+}
+
+/// Begins to read an image on another thread.
+fn begin_to_read(images: &TrainingImages, index: usize) -> Receiver<Result<Arc<CoveredImage>, DatasetError>> {
+    let (sender, receiver) = sync_channel(1);
+    let (view, size) = (images.views[index].clone(), images.shots[index].view.size);
+    rayon::spawn(move || {
+        // The receiver is gone after a jump to another step.
+        sender.send(Shot::read(&view, size)).ok();
+    });
+    receiver
 }

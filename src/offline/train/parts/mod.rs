@@ -13,6 +13,7 @@
 //! | `regularizer` | the terms of the loss that depend on Gaussians alone | a weight of [`Terms`](super::Terms) |
 //! | `dropout` | views without a random share of the Gaussians | [`Growth`](super::Growth) |
 //! | `noise` | random motion of faint Gaussians | [`Growth`](super::Growth) |
+//! | `standing` | Gaussians of a long life kept at rest | [`standing`](super::FineTuneSettings::standing) |
 //! | `relocation` | the relocation of faded Gaussians | [`Growth`](super::Growth) |
 //! | `cloning` | the densification of the original | [`Growth::cloning`](super::Growth::cloning) |
 //!
@@ -31,6 +32,7 @@ pub(crate) mod regularizer;
 mod relocation;
 pub(crate) mod request;
 pub(crate) mod rounding;
+pub(crate) mod standing;
 
 pub(crate) use request::{Request, RoundingSettings};
 
@@ -44,7 +46,7 @@ use std::any::Any;
 type Make = fn(&Workspace<'_>, &Request<'_>) -> Result<Option<Box<dyn Part>>, TrainerError>;
 
 /// Every optional part, in the order of the passes of a step and of the buffers of a state.
-const PARTS: [Make; 10] = [
+const PARTS: [Make; 11] = [
     environment::TrainedEnvironment::make,
     exposure::TrainedExposures::make,
     codebooks::TrainedCodebooks::make,
@@ -53,12 +55,14 @@ const PARTS: [Make; 10] = [
     regularizer::Regularizer::make,
     dropout::Dropout::make,
     noise::Noise::make,
+    // After the noise, which moves Gaussians in time.
+    standing::StandingGaussians::make,
     relocation::Relocation::make,
     cloning::Densifier::make,
 ];
 
 /// The passes of the parts.
-pub static PART_SHADERS: [&ShaderSet; 9] = [
+pub static PART_SHADERS: [&ShaderSet; 10] = [
     &environment::SHADERS,
     &exposure::SHADERS,
     &codebooks::SHADERS,
@@ -66,6 +70,7 @@ pub static PART_SHADERS: [&ShaderSet; 9] = [
     &regularizer::SHADERS,
     &dropout::SHADERS,
     &noise::SHADERS,
+    &standing::SHADERS,
     &moves::SHADERS,
     &cloning::SHADERS,
 ];

@@ -33,6 +33,7 @@ pub(super) fn compress(
     saves: Option<Saves<'_>>,
     progress: &mut dyn Progress,
 ) -> Result<GaussianScene, TrainError> {
+    session.enter(session.settings.steps, progress)?;
     session.trainer.forget_moments();
     let scene = session.trainer.scene()?.into_runtime()?;
     let settings = CompressSettings::suiting(quality, scene.len());

@@ -10,10 +10,12 @@
 //! | `session` | what both phases use: one step, one evaluation, the scene of a run |
 //! | `batch` | the views and images of a step |
 //! | `evaluation` | the PSNR on the validation views |
+//! | `repair` | births where cameras see an error, floaters |
 
 mod batch;
 mod codebook_phase;
 mod evaluation;
+mod repair;
 mod session;
 mod steps;
 

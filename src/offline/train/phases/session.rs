@@ -10,6 +10,7 @@ use crate::offline::forms::sliced;
 use crate::offline::score::GpuEngine;
 use crate::offline::train::error::TrainError;
 use crate::offline::train::images::TrainingImages;
+use crate::offline::train::images::reduced::{Coarse, Detail};
 use crate::offline::train::parts::Request;
 use crate::offline::train::results::FineTuned;
 use crate::offline::train::results::best_parameters::Progressed;
@@ -20,6 +21,7 @@ use crate::offline::work::Progress;
 use crate::renderer::{Headless, ShaderChecks};
 use crate::scene::{FilterKind, GaussianScene, RuntimeScene, TemporalFilter, TrainedWith};
 use crate::view::{Background, Picture};
+use std::borrow::Cow;
 
 /// Views that are drawn before the first step, so that there is room for the pairs of all.
 const VIEWS_OF_ROOM: usize = 64;
@@ -28,9 +30,16 @@ const VIEWS_OF_ROOM: usize = 64;
 pub(super) struct Session<'a> {
     pub(super) trainer: Trainer<'a>,
     pub(super) settings: &'a FineTuneSettings,
-    images: &'a TrainingImages,
-    batches: Batches<'a>,
-    background: Background,
+    /// The images of the run, at whole size.
+    given: &'a TrainingImages,
+    /// The images at their present size.
+    pub(super) images: Cow<'a, TrainingImages>,
+    /// The present size; `None` before the first step of a run with sizes.
+    detail: Option<Detail>,
+    /// The sizes of the images; `None`: always whole.
+    coarse: Option<Coarse>,
+    batches: Batches,
+    pub(super) background: Background,
     /// Segments of the scene's filter of the kind support, which changes no picture: it is left out of training and
     /// computed afterwards.
     support: Option<u32>,
@@ -61,16 +70,51 @@ impl<'a> Session<'a> {
         for index in even_subset(&images.views, VIEWS_OF_ROOM) {
             trainer.make_room(&images.shots[index].view)?;
         }
-        Ok(Self { trainer, settings, images, batches, background, support })
+        let coarse = settings.coarse.map(|coarse| coarse.over(images.all_views().map(|view| view.size)));
+        let detail = coarse.is_none().then_some(Detail::Whole);
+        let (given, images) = (images, Cow::Borrowed(images));
+        Ok(Self { trainer, settings, given, images, detail, coarse, batches, background, support })
+    }
+
+    /// Uses images of the size of this step, from 0, from now on. Returns whether they had another size before. Begins
+    /// the task "loading images", twice, if images are loaded.
+    pub(super) fn enter(&mut self, step: usize, progress: &mut dyn Progress) -> Result<bool, TrainError> {
+        let Some(coarse) = self.coarse else { return Ok(false) };
+        let detail = coarse.detail(step, self.settings.steps);
+        if self.detail == Some(detail) {
+            return Ok(false);
+        }
+        // What was loaded at the size before is freed first.
+        self.images = Cow::Borrowed(self.given);
+        let images = self.given.at(&coarse, detail, progress)?;
+        self.batches = Batches::new(&self.trainer, &images, self.settings, self.background)?;
+        self.images = Cow::Owned(images);
+        Ok(self.detail.replace(detail).is_some())
+    }
+
+    /// Returns whether the images have their whole size at present.
+    pub(super) fn is_whole(&self) -> bool {
+        self.detail == Some(Detail::Whole)
+    }
+
+    /// Returns the name of the task of the steps at the present size.
+    pub(super) fn task(&self) -> &'static str {
+        match (self.detail, self.settings.growth) {
+            (Some(Detail::Quarter), Some(_)) => "training at a quarter of the size",
+            (Some(Detail::Half), Some(_)) => "training at half the size",
+            (Some(Detail::Quarter), None) => "fine-tuning at a quarter of the size",
+            (Some(Detail::Half), None) => "fine-tuning at half the size",
+            (Some(Detail::Whole) | None, _) => self.settings.task(),
+        }
     }
 
     /// Makes the step of this number, from 0, which is number `count`, from 1, since the moments were 0, with this
     /// factor on all rates.
     pub(super) fn step(&mut self, index: usize, count: usize, factor: f64) -> Result<(), TrainError> {
         let step = self.settings.step(index, count, factor);
-        let batch = self.batches.of_step(&self.trainer, index)?;
+        let batch = self.batches.of_step(&self.trainer, &self.images, index)?;
         self.trainer.begin_step(&step)?;
-        self.trainer.accumulate(&self.batches.samples(&batch), self.settings.similarity_share)?;
+        self.trainer.accumulate(&self.batches.samples(&self.images, &batch), self.settings.similarity_share)?;
         self.trainer.accumulate_terms(index)?;
         self.trainer.optimize(&step)?;
         Ok(self.trainer.end_step(&step)?)
@@ -127,14 +171,14 @@ impl<'a> Session<'a> {
     /// Returns the PSNR on the validation views of the scene as it is, dB; `None` without validation views.
     pub(super) fn evaluate(&mut self) -> Result<Option<f64>, TrainError> {
         let (trainer, background) = (&mut self.trainer, self.background);
-        psnr(self.images, background, |view| trainer.draw(view, background))
+        psnr(&self.images, background, |view| trainer.draw(view, background))
     }
 
     /// Returns the same of another scene, such as a compressed one.
     pub(super) fn evaluate_scene(&mut self, scene: &RuntimeScene) -> Result<Option<f64>, TrainError> {
         let (headless, background) = (self.trainer.headless_mut(), self.background);
         let capture = headless.upload(scene)?;
-        psnr(self.images, background, |view| headless.render(&capture, view, background))
+        psnr(&self.images, background, |view| headless.render(&capture, view, background))
     }
 
     /// Returns the image of a validation view over the background, of a training view without any, and the scene as it

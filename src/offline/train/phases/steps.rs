@@ -2,12 +2,14 @@
 //!
 //! In: a run, optionally a stored state. Out: the best parameters, and the curve up to the last step.
 
+use super::repair::Repairs;
 use super::session::Session;
 use crate::offline::score::ScoreError;
 use crate::offline::train::error::TrainError;
 use crate::offline::train::results::CurvePoint;
 use crate::offline::train::results::best_parameters::{Best, Progressed};
 use crate::offline::train::results::live_package::Scene;
+use crate::offline::train::results::outcome::describe_validation;
 use crate::offline::train::results::preview::Preview;
 use crate::offline::train::results::stored_state::{Checkpoint, Saves};
 use crate::offline::train::schedule::decay;
@@ -35,17 +37,23 @@ pub(super) fn train(
 ) -> Result<Progressed, TrainError> {
     let settings = session.settings;
     let mut phase = StepPhase::begin(session, stored, saves, progress)?;
-    progress.begin(settings.task(), settings.steps);
+    progress.begin(session.task(), settings.steps);
     (0..phase.first).for_each(|_| progress.advance());
-    while phase.step < settings.steps && !phase.is_over(settings) {
+    while phase.step < settings.steps && !(session.is_whole() && phase.is_over(settings)) {
         // The last state is of an earlier evaluation: a resumed run makes the steps since then again, and ends at the
         // same bytes.
         if progress.is_interrupted() {
             return Err(session.interrupted(phase.end(true)));
         }
+        match phase.enter(session, progress) {
+            Err(TrainError::Interrupted { .. }) => return Err(session.interrupted(phase.end(true))),
+            entered => entered?,
+        }
         session.step(phase.step, phase.step + 1, decay(phase.step, settings.steps, settings.last_rate))?;
         phase.step += 1;
         progress.advance();
+        // Before a state is stored: a resumed run does not repeat it.
+        phase.repairs.after_step(session, phase.step)?;
         phase.tell_faults(session, progress)?;
         if phase.step.is_multiple_of(settings.refresh_filter.max(1)) && phase.step != settings.steps {
             match session.refresh_filter(progress) {
@@ -79,6 +87,7 @@ struct StepPhase<'a> {
     /// Steps made, with these.
     step: usize,
     has_told_faults: bool,
+    repairs: Repairs,
     preview: Option<Preview>,
     saves: Option<Saves<'a>>,
     clock: Clock,
@@ -106,6 +115,9 @@ impl<'a> StepPhase<'a> {
     ) -> Result<Self, TrainError> {
         let settings = session.settings;
         let stored = stored.filter(|stored| session.trainer.resume(&stored.state));
+        // The size of the step before: a state that was stored between two sizes goes on like the run that stored it.
+        let made = stored.as_ref().and_then(|stored| stored.curve.last()).map_or(0, |point| point.step);
+        session.enter(made.saturating_sub(1), progress)?;
         let (curve, best) = match stored {
             Some(Checkpoint { curve, best, .. }) => {
                 let step = curve.last().map_or(0, |last| last.step);
@@ -125,7 +137,23 @@ impl<'a> StepPhase<'a> {
         let first = curve.last().map_or(0, |last| last.step);
         let now = Instant::now();
         let clock = Clock { begun: now, since: now, seconds: 0.0, stored: (now, Duration::ZERO) };
-        Ok(Self { curve, best, first, step: first, has_told_faults: false, preview, saves, clock })
+        let repairs = Repairs::of(session);
+        Ok(Self { curve, best, first, step: first, has_told_faults: false, repairs, preview, saves, clock })
+    }
+
+    /// Uses images of the size of the next step, with its own task. Evaluations at another size are not comparable:
+    /// from then on, the best is looked for anew.
+    fn enter(&mut self, session: &mut Session<'_>, progress: &mut dyn Progress) -> Result<(), TrainError> {
+        let seconds = self.clock.since.elapsed().as_secs_f64();
+        if session.enter(self.step, progress)? {
+            self.best = Best::unmeasured(self.step, session.trainer.state()?);
+            self.clock.seconds += seconds;
+            progress.finish();
+            progress.begin(session.task(), session.settings.steps);
+            (0..self.step).for_each(|_| progress.advance());
+            self.clock.since = Instant::now();
+        }
+        Ok(())
     }
 
     /// Returns whether no evaluation has been better for as many as patience allows.
@@ -158,6 +186,7 @@ impl<'a> StepPhase<'a> {
         let speed = (step - self.first) as f64 / self.clock.seconds;
         let growth = self.growth(session)?;
         progress.note(&format!("{}{growth}", point.describe(Some(speed))));
+        progress.show(&describe_validation(point.psnr));
         self.curve.push(point);
         if let Some(preview) = &mut self.preview {
             preview.write(session.shown()?, progress)?;
@@ -177,12 +206,15 @@ impl<'a> StepPhase<'a> {
 
     /// Returns the number of Gaussians, what has been done to them since the last evaluation, and the time left, in
     /// words; nothing if the scene is fine-tuned.
-    fn growth(&self, session: &mut Session<'_>) -> Result<String, TrainError> {
+    fn growth(&mut self, session: &mut Session<'_>) -> Result<String, TrainError> {
         let Some(changes) = session.trainer.report() else { return Ok(String::new()) };
+        let changes = changes + &self.repairs.report();
         let (made, left) = (self.step - self.first, session.settings.steps - self.step);
         let left = (self.clock.begun.elapsed().as_secs_f64() * left as f64 / made as f64).round() as u64;
         let count = session.trainer.live_count()?;
-        Ok(format!(", {count} Gaussians, {changes}, {} min {} s left", left / 60, left % 60))
+        // Later steps at a larger size take longer.
+        let at_least = if session.is_whole() { "" } else { "at least " };
+        Ok(format!(", {count} Gaussians, {changes}, {at_least}{} min {} s left", left / 60, left % 60))
     }
 
     /// Stores the state if that is due.

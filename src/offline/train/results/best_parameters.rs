@@ -13,6 +13,14 @@ pub(crate) struct Best {
     pub state: TrainerState,
 }
 
+impl Best {
+    /// Returns the parameters after a step from which on evaluations are compared anew, because images have another
+    /// size: every evaluation is better.
+    pub(crate) fn unmeasured(step: usize, state: TrainerState) -> Self {
+        Self { point: CurvePoint { step, loss: None, training_psnr: None, psnr: None }, state }
+    }
+}
+
 /// What a run has found so far.
 #[derive(Debug, Clone)]
 pub(crate) struct Progressed {

@@ -4,39 +4,30 @@
 //! points, at points of the visual hull, or at random ones in the box that the cameras look at; an environment map
 //! behind them if the images show surroundings, or on request.
 //!
-//! Opacity is 0.1; the spatial scale is the root of the mean squared distance to the three nearest points; the temporal
-//! scale is a share of the interval; no Gaussian is rotated or moves (section 5.4 of the 4DGS model).
+//! Opacity is 0.1; the spatial scale is the root of the mean squared distance to the three nearest points, of the same
+//! time where points have times; the temporal scale is a share of the interval, and three intervals for points of what
+//! stands; Gaussians have the velocity of their point, and are not rotated otherwise (section 5.4 of the 4DGS model).
 
 use super::error::StartError;
+use super::gaussians::{Looks, trained};
 use super::hull::hull;
+use super::measured::{GRAY, Measured, any_time, in_cube};
 use super::point::StartPoint;
 use super::region::Region;
 use super::surroundings::{surroundings, usual_rows};
-use crate::gaussian::harmonics::evaluated;
-use crate::gaussian::{Harmonics, Parameters};
 use crate::offline::dataset::CoveredImage;
 use crate::offline::dataset::point_cloud::PointCloud;
 use crate::offline::train::TrainingImages;
-use crate::offline::train::reference::neighbors::{NEIGHBORS, neighbors};
+use crate::offline::train::reference::standing::STANDING_TIME_SCALE;
 use crate::scene::random::Random;
-use crate::scene::{GaussianScene, PlaybackHints, SceneForm, Trained, TrainedWith};
+use crate::scene::{GaussianScene, PlaybackHints, SceneForm, TrainedWith};
 use crate::view::View;
 use glam::Vec3;
 
-/// Opacity before the first step.
-const OPACITY: f32 = 0.1;
 /// Temporal scale, as a share of the interval, unless moments are further apart.
 const USUAL_TIME_SCALE: f64 = 0.1;
 /// Least squared scale, units of length squared.
 const LEAST_SQUARE: f32 = 1e-7;
-/// Nearest points that give the scale.
-const NEAREST: usize = 3;
-/// Value of the first spherical harmonic: a coefficient is `color − 0.5` divided by it.
-const SH_C0: f32 = 0.282_094_79;
-/// Share of the interval by which random times are outside, at each end.
-const OUTSIDE: f32 = 0.1;
-/// Color of random points, that of the original.
-const GRAY: f32 = 127.0 / 255.0;
 /// Distance of points that fill a hull of too few, as a share of the half side of the box.
 const FILLING: f32 = 0.02;
 
@@ -77,6 +68,11 @@ pub struct StartSettings {
     /// Temporal scale, as a share of the interval; `None`: a tenth, and at least the mean step between two moments of
     /// the images. The original's is `√(T/5)` for an interval of length `T`.
     pub time_scale: Option<f64>,
+    /// Whether Gaussians begin with the velocities of their points. Default: `false`.
+    pub velocities: bool,
+    /// Whether points without a time, beside others with one, begin as Gaussians that stand still during the whole
+    /// interval. Default: `false`, they begin at random times.
+    pub standing: bool,
     /// Seed of the random numbers.
     pub seed: u64,
     /// Spatial degree of color, 0 to 3.
@@ -95,6 +91,8 @@ impl Default for StartSettings {
             gaussians: 60_000,
             start: Start::Auto,
             time_scale: None,
+            velocities: false,
+            standing: false,
             seed: 0,
             degree: 3,
             degree_t: 2,
@@ -128,8 +126,9 @@ pub fn begin(
     let usual = || usual_time_scale(images.all_views().map(|view| view.time).collect());
     let scale_t = settings.time_scale.unwrap_or_else(usual) as f32 * span;
     let (degree, degree_t) = (settings.degree.min(3), if settings.degree >= 3 { settings.degree_t.min(2) } else { 0 });
+    let looks = Looks { least, scale_t, standing_t: STANDING_TIME_SCALE * span, degree, degree_t };
     let scene = GaussianScene {
-        form: SceneForm::Trained(trained(&points, least, scale_t, degree, degree_t)),
+        form: SceneForm::Trained(trained(&points, &looks)),
         environment: (rows > 0).then(|| surroundings(background, rows)),
         filter: None,
         trained_with,
@@ -157,9 +156,11 @@ fn points(
 ) -> Result<(Vec<StartPoint>, Start), StartError> {
     let count = settings.gaussians;
     let mut random = Random::new(settings.seed);
+    let StartSettings { velocities, standing, .. } = *settings;
+    let measured = Measured { interval, least, velocities, standing };
     if settings.start == Start::Points {
-        let cloud = cloud.ok_or(StartError::NoPoints)?;
-        return Ok((measured(cloud, interval, count, least, &mut random), Start::Points));
+        let PointCloud(own) = cloud.ok_or(StartError::NoPoints)?;
+        return Ok((measured.points(own, count, &mut random), Start::Points));
     }
     let with_gaps = images.iter().filter(|(_, image)| image.has_gaps).count();
     let wants_hull = match settings.start {
@@ -187,86 +188,18 @@ fn points(
             return Err(StartError::NoHull);
         }
     }
-    if let Some(cloud) = cloud.filter(|_| settings.start == Start::Auto) {
-        return Ok((measured(cloud, interval, count, least, &mut random), Start::Points));
+    if let Some(PointCloud(own)) = cloud.filter(|_| settings.start == Start::Auto) {
+        return Ok((measured.points(own, count, &mut random), Start::Points));
     }
     let region = region?;
     let mut point = || StartPoint {
         position: region.center + region.half * in_cube(&mut random),
         time: any_time(interval, &mut random),
         color: Vec3::splat(GRAY),
+        velocity: Vec3::ZERO,
+        stands: false,
     };
     Ok(((0..count).map(|_| point()).collect(), Start::Random))
-}
-
-/// Returns a random place in the cube from −1 to 1.
-fn in_cube(random: &mut Random) -> Vec3 {
-    Vec3::from([(); 3].map(|()| random.in_range(-1.0, 1.0)))
-}
-
-/// Returns a random time of the interval, or a little outside: Gaussians outside serve its first and last moments (the
-/// original's margin).
-fn any_time(interval: [f32; 2], random: &mut Random) -> f32 {
-    interval[0] + (interval[1] - interval[0]) * random.in_range(-OUTSIDE, 1.0 + OUTSIDE)
-}
-
-/// Returns so many of these points: some of them if there are more, and further ones beside them if there are fewer.
-/// Points without times get random ones. `least` is the least squared distance of points beside each other.
-fn measured(cloud: &PointCloud, interval: [f32; 2], count: usize, least: f32, random: &mut Random) -> Vec<StartPoint> {
-    let PointCloud(own) = cloud;
-    let point = |index: usize, beside: Vec3, random: &mut Random| StartPoint {
-        position: own[index].position + beside,
-        time: own[index].time.unwrap_or_else(|| any_time(interval, random)),
-        color: own[index].color.unwrap_or(Vec3::splat(GRAY)),
-    };
-    if own.len() > count {
-        // The first of a random order (Fisher and Yates).
-        let mut order: Vec<usize> = (0..own.len()).collect();
-        for index in 0..count {
-            let other = index + ((random.unit() * (own.len() - index) as f32) as usize).min(own.len() - index - 1);
-            order.swap(index, other);
-        }
-        return order[..count].iter().map(|&index| point(index, Vec3::ZERO, random)).collect();
-    }
-    let places: Vec<[f32; 3]> = own.iter().map(|point| point.position.to_array()).collect();
-    let distances: Vec<f32> = squares(&places, least).into_iter().map(f32::sqrt).collect();
-    let further = |index: usize| {
-        let beside = if index < own.len() { Vec3::ZERO } else { distances[index % own.len()] * in_cube(random) };
-        point(index % own.len(), beside, random)
-    };
-    (0..count).map(further).collect()
-}
-
-/// Returns for each place the mean squared distance to the nearest others, at least `least`.
-fn squares(places: &[[f32; 3]], least: f32) -> Vec<f32> {
-    let near = neighbors(places);
-    let square = |(index, own): (usize, &[u32])| {
-        let square = |&other: &u32| Vec3::from(places[index]).distance_squared(Vec3::from(places[other as usize]));
-        (own[1..=NEAREST].iter().map(square).sum::<f32>() / NEAREST as f32).max(least)
-    };
-    near.chunks_exact(NEIGHBORS).enumerate().map(square).collect()
-}
-
-/// Returns Gaussians at these points, with at least this squared spatial scale, and with this temporal scale.
-fn trained(points: &[StartPoint], least: f32, scale_t: f32, degree: u32, degree_t: u32) -> Trained {
-    let mean: Vec<[f32; 3]> = points.iter().map(|point| point.position.to_array()).collect();
-    let count = points.len();
-    let unrotated = vec![[1.0, 0.0, 0.0, 0.0]; count];
-    let parameters = Parameters {
-        mean_t: points.iter().map(|point| point.time).collect(),
-        log_scale: squares(&mean, least).into_iter().map(|square| [0.5 * square.ln(); 3]).collect(),
-        log_scale_t: vec![scale_t.ln(); count],
-        rotation_l: unrotated.clone(),
-        rotation_r: unrotated,
-        opacity_logit: vec![(OPACITY / (1.0 - OPACITY)).ln(); count],
-        mean,
-    };
-    let coefficients = evaluated(degree, degree_t);
-    let mut values = vec![0.0; count * coefficients * 3];
-    for (own, point) in values.chunks_exact_mut(coefficients * 3).zip(points) {
-        own[..3].copy_from_slice(&((point.color - 0.5) / SH_C0).to_array());
-    }
-    Trained { parameters, harmonics: Harmonics { coefficients, degree, degree_t, values } }
 }
 
 #[cfg(test)]
@@ -305,7 +238,8 @@ mod tests {
         let point = |index: usize| CloudPoint {
             position: Vec3::X * index as f32,
             color: Some(Vec3::Y),
-            time: (index > 0).then_some(0.2 + 1e-4 * index as f32),
+            time: Some(0.2 + 1e-4 * index as f32),
+            velocity: Vec3::ZERO,
         };
         PointCloud((0..count).map(point).collect())
     }
@@ -350,31 +284,13 @@ mod tests {
                 // The nearest points of those at the ends are one, two and three units away.
                 assert!(beside <= 3f32.sqrt() * (14.0f32 / 3.0).sqrt(), "{given} points: beside its point: {beside}");
                 assert_eq!(point.color, Vec3::Y, "its color");
-                assert!((-0.08..0.88).contains(&point.time), "its time, or any of the interval: {}", point.time);
+                assert!((0.19..0.72).contains(&point.time), "a time of the file: {}", point.time);
             }
-            let timed = found.iter().filter(whole).filter(|point| point.position.x > 0.0);
-            let mut at_time = timed.map(|point| (point.time - 0.2 - 1e-4 * point.position.x).abs());
+            let mut at_time =
+                found.iter().filter(whole).map(|point| (point.time - 0.2 - 1e-4 * point.position.x).abs());
             assert!(at_time.all(|error| error < 1e-5), "{given} points: the time of the file");
         }
         let alone = start(255, Start::Points, Some(&cloud(1))).expect("a point is given").0;
         assert!(alone.iter().all(|point| point.position.length() < 1e-3), "all at the only point");
-    }
-
-    #[test]
-    fn gaussians_begin_as_in_the_original() {
-        let (points, _) = start(255, Start::Auto, None).expect("random points");
-        let Trained { parameters, harmonics } = trained(&points, LEAST_SQUARE, 0.4, 3, 2);
-        let times = parameters.mean_t.iter().copied();
-        let [first, last] = [times.clone().fold(f32::MAX, f32::min), times.fold(f32::MIN, f32::max)];
-        assert!((-0.08..-0.04).contains(&first) && (0.84..0.88).contains(&last), "a tenth outside: {first} to {last}");
-        assert!((parameters.log_scale_t[0].exp() - 0.4).abs() < 1e-6, "the temporal scale");
-        assert!((1.0 / (1.0 + (-parameters.opacity_logit[0]).exp()) - 0.1).abs() < 1e-6, "opacity");
-        let mut distances: Vec<f32> = points.iter().map(|p| p.position.distance_squared(points[7].position)).collect();
-        distances.sort_by(f32::total_cmp);
-        let expected = (distances[1..4].iter().sum::<f32>() / 3.0).sqrt();
-        assert!((parameters.log_scale[7][1].exp() / expected - 1.0).abs() < 1e-5, "scale from the nearest points");
-        assert_eq!((harmonics.coefficients, harmonics.is_consistent(700)), (48, true), "all degrees");
-        let dc = harmonics.of(7)[0] * SH_C0 + 0.5;
-        assert!((dc - GRAY).abs() < 1e-6 && harmonics.of(7)[3..].iter().all(|&value| value == 0.0), "gray: {dc}");
     }
 }

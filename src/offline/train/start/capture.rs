@@ -16,6 +16,8 @@ use glam::{DVec3, Vec3};
 const EXTENT: f64 = 1.1;
 /// Largest distance of the cameras from their common target, in extents; larger ones count as this.
 const FARTHEST: f32 = 5.0;
+/// Times that are closer together than this are seconds, not shares of the interval.
+const LEAST_SHARE: f32 = 0.1;
 /// Cameras closer together than this share of their distance from the origin stand in one place.
 const ONE_PLACE: f64 = 1e-6;
 
@@ -104,12 +106,13 @@ fn counted_from(origin: f64, interval: [f64; 2]) -> Result<[f32; 2], StartError>
     if is_whole { Ok([first, last]) } else { Err(StartError::Interval { interval }) }
 }
 
-/// Returns 0 to 1 if no view is outside and frames are not numbered; else the first and the last time, or one unit from
+/// Returns 0 to 1 if no view is outside, frames are not numbered, and the views are of a tenth of it or of one time; else the first and the last time, or one unit from
 /// the only time.
 fn interval(views: &[TrainingView], is_numbered: bool) -> [f32; 2] {
     let times = || views.iter().map(|view| view.time);
     let [first, last] = [times().fold(f32::INFINITY, f32::min), times().fold(f32::NEG_INFINITY, f32::max)];
-    let are_shares = !is_numbered && (0.0..=1.0).contains(&first) && (0.0..=1.0).contains(&last);
+    let is_short = first < last && last - first < LEAST_SHARE;
+    let are_shares = !is_numbered && !is_short && (0.0..=1.0).contains(&first) && (0.0..=1.0).contains(&last);
     match are_shares {
         true => [0.0, 1.0],
         false if first < last => [first, last],

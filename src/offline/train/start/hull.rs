@@ -61,7 +61,7 @@ pub(crate) fn hull(
                     // A random time closer to this moment than to others.
                     _ => silhouettes[index].time + (late - 0.5) * (interval[1] - interval[0]) / moments as f32,
                 };
-                Some(StartPoint { position, time, color })
+                Some(StartPoint { position, time, color, velocity: Vec3::ZERO, stands: false })
             };
             (0..AT_ONCE).filter_map(candidate).collect::<Vec<_>>()
         };

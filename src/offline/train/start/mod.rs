@@ -7,9 +7,12 @@ pub(crate) mod begin;
 pub(crate) mod capacity;
 pub(crate) mod capture;
 pub(crate) mod error;
+mod gaussians;
 pub(crate) mod hull;
+mod measured;
 pub(crate) mod point;
 pub(crate) mod region;
+pub(crate) mod seen;
 pub(crate) mod surroundings;
 
 pub use begin::{Start, StartSettings, begin};

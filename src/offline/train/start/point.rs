@@ -4,7 +4,7 @@
 
 use glam::Vec3;
 
-/// A point in space and time, with a color.
+/// A point in space and time, with a color and a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct StartPoint {
     /// Capture space.
@@ -13,4 +13,8 @@ pub(crate) struct StartPoint {
     pub time: f32,
     /// RGB, 0 to 1.
     pub color: Vec3,
+    /// Capture units for each unit of timestamps.
+    pub velocity: Vec3,
+    /// Whether the point is of what stands still during the whole interval.
+    pub stands: bool,
 }

@@ -9,9 +9,10 @@ use glam::{DMat3, DVec3, Vec3};
 
 /// Half the side of the cube, as a share of half the width of a picture at the center (1.3 of 1.44 in D-NeRF).
 const SHARE: f64 = 0.9;
-/// Below this determinant of the mean, axes are nearly parallel and have no closest point; below this length of the
-/// mean, they cancel out.
-const PARALLEL: f64 = 1e-3;
+/// Below this determinant of the mean, axes are nearly parallel and have no closest point.
+const PARALLEL: f64 = 1e-4;
+/// Below this length of the mean, axes cancel out.
+const OPPOSITE: f64 = 1e-3;
 /// Distance of the center from the middle of parallel cameras, in distances of the farthest camera from that middle.
 const AHEAD: f64 = 3.0;
 
@@ -51,7 +52,7 @@ impl Region {
             let spread = cameras.iter().map(|ray| ray.origin.distance(middle)).fold(0.0, f64::max);
             let direction = cameras.iter().map(|ray| ray.direction).sum::<DVec3>() / count;
             // Directions that cancel out have no common one.
-            let direction = (direction.length() > PARALLEL).then(|| direction.normalize())?;
+            let direction = (direction.length() > OPPOSITE).then(|| direction.normalize())?;
             let center = middle + direction * AHEAD * spread;
             Some((center, half_at(center)?))
         };

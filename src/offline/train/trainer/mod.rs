@@ -7,8 +7,10 @@
 //! | `step` | the passes of a step, in their order |
 //! | `scene` | pictures of the scene, the scene and its gradients |
 //! | `state` | what a resumed run goes on from |
+//! | `repair` | Gaussians that are replaced or hidden between steps |
 //! | `results` | losses and faults, and results of optional parts that are not in the scene |
 
+mod repair;
 mod results;
 mod scene;
 pub(crate) mod state;

@@ -17,6 +17,7 @@
 //! | `optimize` | `codebooks` | gradients of coefficients; entries | gradients of entries; coefficients |
 //! | | `adam` | gradients, moments | parameters; gradients and moments |
 //! | | `noise` | raw parameters | the same, with means moved at random |
+//! | | `standing` | raw parameters, color | the same, at rest if they live long |
 //! | | `statistics` | gradients of Gaussians on the screen | their sums over steps |
 //! | | `slice` | raw parameters | sliced Gaussians |
 //! | `end_step` | `relocate` | moves, colors | colors of the Gaussians that move, moments |

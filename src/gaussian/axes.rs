@@ -3,13 +3,13 @@
 //! In: a symmetric 4D matrix. Out: the standard deviations along its axes, with the axis closest to time last, and the
 //! quaternions of the rotation to these axes, as [`rotation_4d`] reads them.
 
-use crate::gaussian::eigen::eigen;
-use crate::gaussian::rotation_4d;
-use glam::{DMat4, DVec4};
+use super::eigen::eigen;
+use super::rotation_4d;
+use glam::{DMat4, DVec4, Vec3};
 
 /// A covariance, decomposed: `Q diag(s)² Qᵀ` with the rotation `Q` of the two quaternions.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Axes {
+pub(crate) struct Axes {
     /// Standard deviations.
     pub scale: DVec4,
     /// Left quaternion.
@@ -21,7 +21,7 @@ pub(super) struct Axes {
 impl Axes {
     /// Decomposes a covariance. `least` is the smallest standard deviation; variances below its square, also negative
     /// ones, are raised to it.
-    pub(super) fn of(covariance: DMat4, least: f64) -> Self {
+    pub(crate) fn of(covariance: DMat4, least: f64) -> Self {
         let (values, mut axes) = eigen(covariance);
         let mut scale = values.max(DVec4::splat(least * least)).map(f64::sqrt);
         let most_time = (0..4).max_by(|&a, &b| axes.col(a).w.abs().total_cmp(&axes.col(b).w.abs())).unwrap_or(3);
@@ -52,6 +52,23 @@ fn quaternions(rotation: DMat4) -> (DVec4, DVec4) {
     let right = rows[longest].normalize_or(DVec4::X);
     let left = DVec4::from_array(rows.map(|row| row.dot(right)));
     (left.normalize_or(DVec4::X), right)
+}
+
+/// Returns the raw scales and rotations of a Gaussian of this squared scale in all directions that moves.
+pub(crate) fn moving(square: f32, scale_t: f32, velocity: Vec3) -> ([f32; 3], f32, [[f32; 4]; 2]) {
+    if velocity == Vec3::ZERO || !velocity.is_finite() {
+        return ([0.5 * square.ln(); 3], scale_t.ln(), [[1.0, 0.0, 0.0, 0.0]; 2]);
+    }
+    let (velocity, variance_t) = (velocity.as_dvec3(), f64::from(scale_t).powi(2));
+    // Σ = diag(σ², σ², σ², 0) + v u uᵀ with u = (velocity, 1): the velocity c/v of section 2 of the 4DGS model.
+    let along = velocity.extend(1.0);
+    let mut covariance = DMat4::from_diagonal(DVec4::new(1.0, 1.0, 1.0, 0.0) * f64::from(square));
+    for column in 0..4 {
+        *covariance.col_mut(column) += along * along[column] * variance_t;
+    }
+    let Axes { scale, left, right } = Axes::of(covariance, f64::MIN_POSITIVE);
+    let logs = scale.map(f64::ln).as_vec4().to_array();
+    ([logs[0], logs[1], logs[2]], logs[3], [left, right].map(|quaternion| quaternion.as_vec4().to_array()))
 }
 
 #[cfg(test)]

@@ -1,0 +1,153 @@
+//! The Gaussians at the points that a training begins with.
+//!
+//! In: points with colors, times and velocities, [`Looks`]. Out: Gaussians in the trained form, and the squared
+//! distances that their scales follow from.
+
+use super::point::StartPoint;
+use crate::gaussian::axes::moving;
+use crate::gaussian::harmonics::evaluated;
+use crate::gaussian::{Harmonics, Parameters};
+use crate::offline::train::reference::neighbors::{NEIGHBORS, neighbors};
+use crate::scene::Trained;
+use glam::Vec3;
+use std::collections::HashMap;
+
+/// Opacity before the first step.
+const OPACITY: f32 = 0.1;
+/// Nearest points that give the scale.
+const NEAREST: usize = 3;
+/// Value of the first spherical harmonic: a coefficient is `color − 0.5` divided by it.
+const SH_C0: f32 = 0.282_094_79;
+
+/// What the Gaussians before the first step have in common.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Looks {
+    /// Least squared spatial scale, units of length squared.
+    pub least: f32,
+    /// Temporal scale, in the unit of timestamps.
+    pub scale_t: f32,
+    /// Temporal scale of what stands.
+    pub standing_t: f32,
+    /// Spatial degree of color, 0 to 3.
+    pub degree: u32,
+    /// Degree of color in time, 0 to 2.
+    pub degree_t: u32,
+}
+
+/// Returns for each place the mean squared distance to the nearest others, at least `least`.
+pub(super) fn squares(places: &[[f32; 3]], least: f32) -> Vec<f32> {
+    let near = neighbors(places);
+    let square = |(index, own): (usize, &[u32])| {
+        let square = |&other: &u32| Vec3::from(places[index]).distance_squared(Vec3::from(places[other as usize]));
+        (own[1..=NEAREST].iter().map(square).sum::<f32>() / NEAREST as f32).max(least)
+    };
+    near.chunks_exact(NEIGHBORS).enumerate().map(square).collect()
+}
+
+/// Returns for each point the mean squared distance to the nearest others, at least `least`: to those of its time, if
+/// there are many of each time.
+fn squares_of(points: &[StartPoint], least: f32) -> Vec<f32> {
+    let mut of_time: HashMap<Option<u32>, Vec<usize>> = HashMap::new();
+    for (index, point) in points.iter().enumerate() {
+        of_time.entry((!point.stands).then(|| point.time.to_bits())).or_default().push(index);
+    }
+    let many = of_time.values().all(|of_time| of_time.len() > NEIGHBORS);
+    let groups: Vec<Vec<usize>> =
+        if many { of_time.into_values().collect() } else { vec![(0..points.len()).collect()] };
+    let mut squared = vec![least; points.len()];
+    for group in groups {
+        let places: Vec<[f32; 3]> = group.iter().map(|&index| points[index].position.to_array()).collect();
+        for (&index, square) in group.iter().zip(squares(&places, least)) {
+            squared[index] = square;
+        }
+    }
+    squared
+}
+
+/// Returns Gaussians at these points.
+pub(super) fn trained(points: &[StartPoint], looks: &Looks) -> Trained {
+    let Looks { least, scale_t, standing_t, degree, degree_t } = *looks;
+    let mean: Vec<[f32; 3]> = points.iter().map(|point| point.position.to_array()).collect();
+    let count = points.len();
+    let begun = squares_of(points, least)
+        .into_iter()
+        .zip(points)
+        .map(|(square, point)| moving(square, if point.stands { standing_t } else { scale_t }, point.velocity));
+    let begun: Vec<_> = begun.collect();
+    let parameters = Parameters {
+        mean_t: points.iter().map(|point| point.time).collect(),
+        log_scale: begun.iter().map(|(scale, ..)| *scale).collect(),
+        log_scale_t: begun.iter().map(|(_, scale_t, _)| *scale_t).collect(),
+        rotation_l: begun.iter().map(|(.., [left, _])| *left).collect(),
+        rotation_r: begun.iter().map(|(.., [_, right])| *right).collect(),
+        opacity_logit: vec![(OPACITY / (1.0 - OPACITY)).ln(); count],
+        mean,
+    };
+    let coefficients = evaluated(degree, degree_t);
+    let mut values = vec![0.0; count * coefficients * 3];
+    for (own, point) in values.chunks_exact_mut(coefficients * 3).zip(points) {
+        own[..3].copy_from_slice(&((point.color - 0.5) / SH_C0).to_array());
+    }
+    Trained { parameters, harmonics: Harmonics { coefficients, degree, degree_t, values } }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gaussian::SliceSettings;
+
+    const LOOKS: Looks = Looks { least: 1e-7, scale_t: 0.4, standing_t: 3.0, degree: 3, degree_t: 2 };
+
+    /// Returns points on a spiral, so that distances differ.
+    fn points(count: usize) -> Vec<StartPoint> {
+        let point = |index: usize| {
+            let angle = index as f32 * 0.7;
+            let position = Vec3::new(angle.cos(), angle.sin(), 0.1 * angle) * (1.0 + 0.01 * index as f32);
+            StartPoint { position, time: 0.5, color: Vec3::splat(0.25), velocity: Vec3::ZERO, stands: false }
+        };
+        (0..count).map(point).collect()
+    }
+
+    #[test]
+    fn gaussians_begin_as_in_the_original() {
+        let points = points(700);
+        let Trained { parameters, harmonics } = trained(&points, &LOOKS);
+        assert!((parameters.log_scale_t[0].exp() - 0.4).abs() < 1e-6, "the temporal scale");
+        assert!((1.0 / (1.0 + (-parameters.opacity_logit[0]).exp()) - 0.1).abs() < 1e-6, "opacity");
+        let mut distances: Vec<f32> = points.iter().map(|p| p.position.distance_squared(points[7].position)).collect();
+        distances.sort_by(f32::total_cmp);
+        let expected = (distances[1..4].iter().sum::<f32>() / 3.0).sqrt();
+        assert!((parameters.log_scale[7][1].exp() / expected - 1.0).abs() < 1e-5, "scale from the nearest points");
+        assert_eq!((harmonics.coefficients, harmonics.is_consistent(700)), (48, true), "all degrees");
+        let dc = harmonics.of(7)[0] * SH_C0 + 0.5;
+        assert!((dc - 0.25).abs() < 1e-6 && harmonics.of(7)[3..].iter().all(|&value| value == 0.0), "gray: {dc}");
+    }
+
+    #[test]
+    fn a_gaussian_begins_with_the_velocity_of_its_point() {
+        let velocities = [Vec3::ZERO, Vec3::new(3.0, -2.0, 0.5), Vec3::new(0.0, 0.0, -20.0), Vec3::X * 1e-3];
+        let mut points = points(velocities.len());
+        points.iter_mut().zip(velocities).for_each(|(point, velocity)| point.velocity = velocity);
+        let parameters = trained(&points, &Looks { scale_t: 0.1, ..LOOKS }).parameters;
+        let sliced = parameters.slice(&SliceSettings::default()).expect("valid parameters");
+        for (index, (gaussian, velocity)) in sliced.iter().zip(velocities).enumerate() {
+            let found = Vec3::from(gaussian.velocity);
+            assert!(found.distance(velocity) < 1e-3 * (1.0 + velocity.length()), "{index}: {found}, not {velocity}");
+            assert!((gaussian.sigma_t / 0.1 - 1.0).abs() < 1e-3, "{index}: temporal scale {}", gaussian.sigma_t);
+            let trace = gaussian.covariance[0] + gaussian.covariance[3] + gaussian.covariance[5];
+            let expected = 3.0 * squares_of(&points, 1e-7)[index];
+            assert!((trace / expected - 1.0).abs() < 0.01, "{index}: the shape does not depend on the velocity");
+        }
+    }
+
+    #[test]
+    fn distances_are_to_points_of_the_same_time() {
+        let mut points = points(200);
+        let alone = squares_of(&points[..100], 1e-7);
+        let (first, second) = points.split_at_mut(100);
+        for (point, of_first) in second.iter_mut().zip(first) {
+            *point = StartPoint { time: 0.75, position: of_first.position + Vec3::X * 1e-3, ..*of_first };
+        }
+        assert_eq!(squares_of(&points, 1e-7)[..100], alone, "as without the points of another time");
+    }
+}
