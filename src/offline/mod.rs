@@ -19,8 +19,10 @@
 //! | [`measure`] | pictures are compared with images: PSNR, SSIM, MS-SSIM, FLIP |
 //! | [`filter`] | the active Gaussians of each segment of time are found |
 //! | [`prune`] | the Gaussians of the highest scores are kept, as many as validation views need |
+//! | [`segments`] | captures of stretches of time become one, and one becomes chunks |
 //! | [`mod@compress`] | the Gaussians are packed, and their colors are coded by codebooks |
 //! | [`mod@train`] | the Gaussians are trained: from pictures alone, or to compensate for removed Gaussians |
+//! | [`mod@footage`] | footage of several cameras becomes a dataset, with a verdict |
 //! | [`mod@detail`] | levels of fewer Gaussians are made, for pictures of few pixels |
 //! | [`report`] | the result of a bake, or of many, becomes a page |
 //! | [`draw`] | pictures are drawn in bulk, from cameras around the scene if there are no others |
@@ -33,12 +35,14 @@ pub mod detail;
 pub mod draw;
 pub mod engine;
 pub mod filter;
+pub mod footage;
 pub mod forms;
 pub mod measure;
 pub mod picture_file;
 pub mod prune;
 pub mod report;
 pub mod score;
+pub mod segments;
 pub mod store;
 pub mod train;
 pub mod work;

@@ -23,12 +23,13 @@ use crate::offline::compress::Quality;
 use crate::offline::dataset::SplitOptions;
 use crate::offline::engine::{Engine, EngineChoice};
 use crate::offline::filter::temporal_filter::FILTER_NAMES;
+use crate::offline::footage::{is_raw, prepared};
 use crate::offline::measure::evaluation::color_name;
 use crate::offline::prune::{Goal, ScoreChoice};
 use crate::offline::report::{BakeReport, Change};
 use crate::offline::store::outputs::Files;
 use crate::offline::store::shard::Shard;
-use crate::offline::train::{FineTuneSettings, TrainError, TrainSettings};
+use crate::offline::train::{FineTuneSettings, TrainError, TrainSettings, Usual};
 use crate::offline::work::write_beside;
 use crate::scene::{FilterKind, GaussianScene, MAX_SEGMENTS};
 use serde_json::json;
@@ -81,7 +82,8 @@ pub(crate) struct Bake {
     /// cameras.
     #[arg(id = "static", long = "static", help_heading = "Data")]
     is_static: bool,
-    /// Number of Gaussians to train from pictures [default: 60000].
+    /// Number of Gaussians to train from pictures [default: 60000, and more for many large pictures of cameras that stand
+    /// still].
     #[arg(long, help_heading = "Training from pictures", value_name = "N", value_parser = values::count(100_000_000))]
     gaussians: Option<usize>,
     /// Steps of training from pictures [default: 20000].
@@ -139,9 +141,10 @@ pub(crate) struct Bake {
     #[arg(long, value_name = "N", default_value = "2", conflicts_with = "no_fine_tune", value_parser = values::count(1000))]
     batch: usize,
     /// Train an exposure for each camera wherever Gaussians are trained, as gs4d train does, for pictures whose cameras
-    /// differ in exposure or white balance. The package has their mean exposure.
-    #[arg(long, conflicts_with = "no_fine_tune")]
-    exposure: bool,
+    /// differ in exposure or white balance. The package has their mean exposure [default: on for pictures of several
+    /// cameras that stand still, else off].
+    #[arg(long, conflicts_with = "no_fine_tune", value_name = "SWITCH", require_equals = true, num_args = 0..=1, default_missing_value = "on", value_parser = values::switch())]
+    exposure: Option<bool>,
     /// Keep the intermediate results in OUT.bake/ at the end.
     #[arg(long)]
     keep_work: bool,
@@ -240,14 +243,29 @@ impl Bake {
     pub(crate) fn run(&self) -> Result<Report, Failure> {
         self.engine.check(&self.given)?;
         self.scoring.check(&self.given, &[self.variant])?;
-        let (settings, progress) = (self.settings(self.package.out()?)?, &mut Bars::default());
+        let (mut settings, progress) = (self.settings(self.package.out()?)?, &mut Bars::default());
         settings.check_files()?;
         let job = self.jobs.job(&self.given, self.is_dataset())?;
+        if self.is_dataset() && !self.is_static && is_raw(&self.input) {
+            if job.is_some() || self.jobs.plan.is_some() {
+                let reason =
+                    "is footage, which is not divided among machines: run gs4d footage first, and bake its dataset";
+                return Err(Failure::about(&self.input, reason));
+            }
+            settings.data = prepared(&self.input, &settings.out, progress)?;
+        }
+        let usual = match self.is_dataset() {
+            true => Usual::read(&settings.data, &settings.splits, progress)?,
+            false => Usual::PLAIN,
+        };
+        if let Some(tuning) = &mut settings.fine_tune {
+            tuning.exposure = self.exposure.unwrap_or(usual.is_rig);
+        }
         if let Some(path) = &self.jobs.plan {
-            return self.plan(path, &settings, progress);
+            return self.plan(path, &settings, &usual, progress);
         }
         let (scene, engine) = if self.is_dataset() {
-            self.train(&settings, job, self.engine.open(&self.given)?, progress)?
+            self.train(&settings, &usual, job, self.engine.open(&self.given)?, progress)?
         } else {
             (self.load(&settings, progress)?, self.engine.open(&self.given)?)
         };
@@ -263,7 +281,13 @@ impl Bake {
     }
 
     /// Writes the bake as jobs.
-    fn plan(&self, path: &Path, settings: &BakeSettings, progress: &mut Bars) -> Result<Report, Failure> {
+    fn plan(
+        &self,
+        path: &Path,
+        settings: &BakeSettings,
+        usual: &Usual,
+        progress: &mut Bars,
+    ) -> Result<Report, Failure> {
         Files::default().reads_scene(&self.input).reads_data(&settings.data).writes(path, "json").check()?;
         let gpu = match self.engine.choice() {
             EngineChoice::Gpu => true,
@@ -279,7 +303,7 @@ impl Bake {
             if !gpu {
                 return Err(TrainError::WithoutGpu.into());
             }
-            let training = self.training(settings);
+            let training = self.training(settings, usual);
             let source = Source::Pictures(training.start.gaussians, training.tuning.steps);
             plan(source, settings, gpu, shards, directory, &command, progress)?
         } else {
@@ -301,12 +325,15 @@ impl Bake {
     }
 
     /// Returns the settings of the training from pictures.
-    fn training(&self, settings: &BakeSettings) -> TrainSettings {
-        let mut training = TrainSettings::usual(settings.data.clone(), settings.splits);
-        training.start.gaussians = self.gaussians.unwrap_or(training.start.gaussians);
+    fn training(&self, settings: &BakeSettings, usual: &Usual) -> TrainSettings {
+        let usual = Usual {
+            gaussians: self.gaussians.unwrap_or(usual.gaussians),
+            steps: self.train_steps.unwrap_or(usual.steps),
+            ..*usual
+        };
+        let mut training = TrainSettings::usual(settings.data.clone(), settings.splits, &usual);
         training.start.environment = self.environment;
-        let steps = self.train_steps.unwrap_or(TrainSettings::STEPS);
-        training.tuning = FineTuneSettings { exposure: self.exposure, ..TrainSettings::tuning(steps) };
+        training.tuning.exposure = self.exposure.unwrap_or(training.tuning.exposure);
         training.capture = self.checkpoint.capture();
         training
     }
@@ -348,11 +375,12 @@ impl Bake {
     fn train(
         &self,
         settings: &BakeSettings,
+        usual: &Usual,
         job: Option<Job>,
         mut engine: Engine,
         progress: &mut Bars,
     ) -> Result<(GaussianScene, Engine), Failure> {
-        let (training, only) = (self.training(settings), job.map(|job| job.stage));
+        let (training, only) = (self.training(settings, usual), job.map(|job| job.stage));
         if only.is_none_or(|stage| stage == TRAIN) {
             check_pictures(settings, &training, &engine, progress)?;
         }
@@ -385,7 +413,7 @@ impl Bake {
             fine_tune: (!self.no_fine_tune).then(|| FineTuneSettings {
                 steps: self.steps,
                 batch: self.batch,
-                exposure: self.exposure,
+                exposure: self.exposure.unwrap_or(false),
                 ..FineTuneSettings::default()
             }),
             quality: self.quality,

@@ -1,7 +1,7 @@
 //! `gs4d info DATASET`: shows what a dataset folder holds.
 //!
 //! In: a folder, how it is read, the path of a picture. Out: its format, cameras, times, sizes, splits, what is missing
-//! and what was assumed; the cameras drawn into the picture.
+//! and what was assumed; the cameras drawn into the picture. Of footage without cameras: its videos and folders.
 
 use crate::cli::output::failure::Failure;
 use crate::cli::output::report::Report;
@@ -10,6 +10,7 @@ use crate::offline::dataset::CameraOptions;
 use crate::offline::dataset::cameras::drawing::draw;
 use crate::offline::dataset::splits::split_name;
 use crate::offline::dataset::summary::{SplitSummary, Summary};
+use crate::offline::footage::uncalibrated;
 use crate::offline::store::outputs::Files;
 use crate::offline::work::write_png;
 use serde_json::{Value, json};
@@ -20,6 +21,9 @@ use std::path::Path;
 /// # Errors
 /// A folder that is no dataset or cannot be read, a picture that cannot be written.
 pub(crate) fn run(folder: &Path, options: &CameraOptions, picture: Option<&Path>) -> Result<Report, Failure> {
+    if let Some(names) = uncalibrated(folder) {
+        return footage_report(folder, &names, picture);
+    }
     let files = Files::default().reads_data(folder);
     picture.iter().fold(files, |files, path| files.writes(path, "png")).check()?;
     let summary = Summary::of(folder, options)?;
@@ -68,4 +72,20 @@ pub(crate) fn run(folder: &Path, options: &CameraOptions, picture: Option<&Path>
         "picture": picture.map(|path| path.display().to_string()),
     });
     Ok(Report::new(json, format!("{}\n{table}", lines(&pairs))))
+}
+
+/// Returns the report of footage whose cameras are not known, given the names of its videos and folders.
+fn footage_report(folder: &Path, names: &[String], picture: Option<&Path>) -> Result<Report, Failure> {
+    if let Some(path) = picture {
+        let message = "cannot be drawn: the cameras of this footage are not known yet; gs4d footage finds them";
+        return Err(Failure::about(path, message));
+    }
+    let command = format!("gs4d footage {} -o DATASET", folder.display());
+    let text = lines(&[
+        ("footage", folder.display().to_string()),
+        ("cameras", format!("{}, whose poses are not known: {}", names.len(), names.join(", "))),
+        ("to do", format!("{command} finds them, and makes a dataset")),
+    ]);
+    let json = json!({ "folder": folder.display().to_string(), "footage": names, "command": command });
+    Ok(Report::new(json, text))
 }

@@ -288,7 +288,7 @@ fn settings(scene: &RuntimeScene, stride: usize) -> InstanceUniforms {
         stages: colors.map_or(0, |colors| colors.entries.len() as u32),
         first_entries: colors.map(first_entries).unwrap_or_default(),
         displaced: u32::from(trained_with.sh_direction == ShDirection::Displaced),
-        time_span: trained_with.time_span(),
+        time_span: trained_with.period_of_colors(),
         marginal_cutoff: trained_with.marginal_cutoff,
         ..bytemuck::Zeroable::zeroed()
     }

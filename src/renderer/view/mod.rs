@@ -10,7 +10,7 @@ mod readback;
 mod record;
 mod resources;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 mod uniforms;
 mod view_renderer;
 

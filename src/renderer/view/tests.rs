@@ -33,7 +33,7 @@ mod depth_texture;
     expect(unreachable_pub, reason = "the integration tests include the same file")
 )]
 #[path = "../../../tests/support/skip.rs"]
-mod skip;
+pub(crate) mod skip;
 
 /// Four tiles in two bins; rows of 1024 bytes.
 const SIZE: UVec2 = UVec2::new(64, 16);

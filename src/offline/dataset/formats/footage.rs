@@ -223,6 +223,14 @@ impl Footage {
     }
 }
 
+/// Returns the names and paths of the videos, and of the folders of frames, in a folder.
+///
+/// # Errors
+/// Two folders or two videos of one name, a folder that cannot be listed.
+pub(crate) fn found(folder: &Path) -> Result<Vec<(String, PathBuf)>, DatasetError> {
+    Ok(footage(folder)?.into_iter().map(|one| (one.name, one.path)).collect())
+}
+
 /// Returns the folders of frames, and the videos of other names.
 ///
 /// # Errors

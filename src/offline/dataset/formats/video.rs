@@ -26,7 +26,7 @@ pub(crate) enum Videos<'a> {
 }
 
 /// The program.
-const PROGRAM: &str = "ffmpeg";
+pub(crate) const PROGRAM: &str = "ffmpeg";
 /// Ending of the name of the folder of decoded frames, after that of the dataset.
 const FRAMES: &str = ".frames";
 /// Folder of videos in a dataset.
@@ -254,7 +254,7 @@ fn temporary_folder(cache: &Path) -> io::Result<TempDir> {
 }
 
 /// Reads all messages of the program. Returns the last of them, in one line.
-fn last_lines(mut messages: impl Read) -> String {
+pub(crate) fn last_lines(mut messages: impl Read) -> String {
     let (mut kept, mut more) = (Vec::new(), [0; 4096]);
     while let Ok(count @ 1..) = messages.read(&mut more) {
         kept.extend_from_slice(&more[..count]);

@@ -60,6 +60,16 @@ pub(crate) fn read(folder: &Path, options: &CameraOptions) -> Result<Undivided, 
     Ok(Undivided { source: model.source, views, splits: None, clock, points, notes, origin })
 }
 
+/// Returns the model of a folder with the most images; `None` if there is no model.
+///
+/// # Errors
+/// A model that cannot be read.
+pub(crate) fn largest(folder: &Path) -> Result<Option<Model>, DatasetError> {
+    let Some(Choice { folder, .. }) = choice::largest(folder) else { return Ok(None) };
+    let is_binary = choice::is_binary(&folder) == Some(true);
+    Ok(Some(if is_binary { binary::read(&folder)? } else { text::read(&folder)? }))
+}
+
 /// Makes paths of the names of images, and sorts images by name. Returns a sentence if images are left out.
 ///
 /// # Errors

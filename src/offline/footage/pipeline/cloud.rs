@@ -1,0 +1,148 @@
+//! The points of footage, as a file.
+//!
+//! In: pictures, masks and plates of the cameras to train on. Out: `points3d.ply`: points of what moves, at every
+//! moment, with velocities, and points of what stands still.
+
+use super::masking::{Names, read_mask, read_plate};
+use crate::offline::dataset::point_cloud::{CloudPoint, PointCloud};
+use crate::offline::footage::FootageError;
+use crate::offline::footage::colmap::{ColmapError, Program, triangulated};
+use crate::offline::footage::points::{Masked, Plate, TakePoints, moving_points, standing_points, write};
+use crate::offline::footage::take::{Filmed, Take};
+use crate::offline::store::results::Key;
+use crate::offline::work::{FileError, Progress};
+use crate::scene::Origin;
+use crate::view::Camera;
+use image::{GrayImage, Luma, RgbImage};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::fs;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+/// The file.
+const FILE: &str = "points3d.ply";
+/// Most points of what moves, and of what stands.
+const MOST_MOVING: usize = 400_000;
+const MOST_STANDING: usize = 100_000;
+/// Number of points of what stands below which more are looked for by matches.
+const FEW: usize = 500;
+/// Most pictures that show what stands, if there are no plates.
+const MOST_PICTURES: usize = 64;
+
+/// The file of points.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Cloud {
+    /// Number of points.
+    pub points: usize,
+    /// The hash of the file; `None` if there are no points.
+    hash: Option<Vec<u8>>,
+}
+
+impl Cloud {
+    /// Finds points, and writes them. `known` are those that the footage comes with: if there are no plates, they
+    /// stand.
+    ///
+    /// # Errors
+    /// A picture or a file that cannot be read, a folder that cannot be written to, an interruption.
+    pub(super) fn write(
+        seen: (&Take, &Names<'_>),
+        known: Option<&(PathBuf, Origin)>,
+        out: &Path,
+        progress: &mut dyn Progress,
+    ) -> Result<Self, FootageError> {
+        let (take, path) = (seen.0, out.join(FILE));
+        let standing = standing(take, known, out, progress)?;
+        let TakePoints { points } = TakePoints::joined(moving(seen, out, progress)?, standing);
+        if points.is_empty() {
+            return match fs::remove_file(&path) {
+                Err(error) if error.kind() != ErrorKind::NotFound => Err(FileError::at(&path, error).into()),
+                _ => Ok(Self { points: 0, hash: None }),
+            };
+        }
+        let middle = take.moments.first().zip(take.moments.last()).map_or(0.0, |(first, last)| first.midpoint(*last));
+        write(&path, &points, &Origin::default(), middle)?;
+        Ok(Self { points: points.len(), hash: Some(Key::of_file(&path)?.bytes().to_vec()) })
+    }
+
+    /// Returns whether the file is in the folder of the dataset, if there is to be one.
+    pub(super) fn is_in(&self, out: &Path) -> bool {
+        let found = Key::of_file(&out.join(FILE)).ok().map(|key| key.bytes().to_vec());
+        found == self.hash
+    }
+
+    /// Returns the name of the file, if there are points.
+    pub(super) fn file(&self) -> Option<&'static str> {
+        self.hash.as_ref().map(|_| FILE)
+    }
+}
+
+/// Returns the points of what moves.
+fn moving(
+    (take, names): (&Take, &Names<'_>),
+    out: &Path,
+    progress: &mut dyn Progress,
+) -> Result<Vec<CloudPoint>, FootageError> {
+    let cameras: Vec<Camera> = take.cameras.iter().map(|camera| camera.camera).collect();
+    let masked = |camera: usize, moment: usize| -> Result<Option<Masked>, FootageError> {
+        let Some(frame) = take.frame(camera, moment) else { return Ok(None) };
+        let Some(mask) = read_mask(out, &take.cameras[camera], frame, names)? else { return Ok(None) };
+        Ok(Some(Masked { camera, picture: frame.picture()?, mask }))
+    };
+    let mut load = |moment: usize| -> Result<Vec<Masked>, FootageError> {
+        (0..take.cameras.len()).into_par_iter().filter_map(|camera| masked(camera, moment).transpose()).collect()
+    };
+    moving_points(&cameras, &take.moments, &mut load, MOST_MOVING, progress)
+}
+
+/// Returns the points of what stands still: those that the plates show, else those that are known, else those that the
+/// first pictures of the cameras show. If cameras are too far apart for that, by matches.
+fn standing(
+    take: &Take,
+    known: Option<&(PathBuf, Origin)>,
+    out: &Path,
+    progress: &mut dyn Progress,
+) -> Result<Vec<CloudPoint>, FootageError> {
+    let plate = |camera: &Filmed| -> Result<Option<Plate>, FootageError> {
+        let of = |(picture, confidence)| Plate { camera: camera.camera, picture, confidence };
+        Ok(read_plate(out, camera)?.map(of))
+    };
+    let mut plates: Vec<Plate> =
+        take.cameras.par_iter().filter_map(|camera| plate(camera).transpose()).collect::<Result<_, _>>()?;
+    if plates.is_empty() {
+        if let Some((path, origin)) = known {
+            let mut points = PointCloud::load(path, origin)?.0;
+            points.retain(|point| point.time.is_none());
+            return Ok(points);
+        }
+        let step = take.cameras.len().div_ceil(MOST_PICTURES).max(1);
+        let cameras: Vec<&Filmed> = take.cameras.iter().step_by(step).collect();
+        let first = |camera: &&Filmed| -> Result<Option<Plate>, FootageError> {
+            let Some(frame) = camera.frames.first() else { return Ok(None) };
+            let picture = frame.picture()?;
+            let confidence = GrayImage::from_pixel(picture.width(), picture.height(), Luma([u8::MAX]));
+            Ok(Some(Plate { camera: camera.camera, picture, confidence }))
+        };
+        plates = cameras.par_iter().filter_map(|camera| first(camera).transpose()).collect::<Result<_, _>>()?;
+    }
+    let mut points = standing_points(&plates, MOST_STANDING, progress)?;
+    if points.len() < FEW {
+        points.extend(matched(plates, progress)?);
+    }
+    Ok(points)
+}
+
+/// Returns the points of matches of pictures that COLMAP finds; none if it is not installed or fails.
+fn matched(plates: Vec<Plate>, progress: &mut dyn Progress) -> Result<Vec<CloudPoint>, FootageError> {
+    let Ok(program) = Program::find() else { return Ok(Vec::new()) };
+    let pictures: Vec<(Camera, RgbImage)> = plates.into_iter().map(|plate| (plate.camera, plate.picture)).collect();
+    // Points of plates have no time.
+    match triangulated(&program, &pictures, 0.0, progress) {
+        Ok(points) => Ok(points),
+        Err(ColmapError::Interrupted(interrupted)) => Err(interrupted.into()),
+        Err(error) => {
+            progress.note(&format!("note: no points are found by matches: {error}"));
+            Ok(Vec::new())
+        }
+    }
+}

@@ -1,0 +1,232 @@
+//! The visual hull of the motion masks of a moment.
+//!
+//! In: the masks of several cameras at one moment, and the cube that the cameras look at. Out: [`Hull`]: the cubes at
+//! the surface of what is inside the masks. Cubes are halved as long as they may be inside, so that cubes of one and a
+//! half pixels are found in a space of several cameras' width: a ball of eight pixels has about a hundred.
+
+use super::cells;
+use super::projection::Projection;
+use crate::offline::train::start::region::Region;
+use crate::view::{Camera, RasterFov, View};
+use glam::{UVec3, Vec2, Vec3};
+use image::GrayImage;
+use rayon::prelude::*;
+
+/// Masks above this value are inside.
+const INSIDE: u8 = 127;
+/// Side of the smallest cubes, pixels at the center.
+const VOXEL: f32 = 1.5;
+/// Side of the space that is searched, in sides of the [`Region`]: things at its border are whole.
+const WIDER: f32 = 2.0;
+/// Halvings of the space before the first test, and most halvings.
+const COARSE: u32 = 5;
+const FINEST: u32 = 12;
+/// Cubes of one size above which they are not halved further: masks that cover nearly everything say little.
+const MOST_CELLS: usize = 1 << 21;
+/// Least share of the cameras showing a place that have it inside their masks.
+const AGREEING: f32 = 0.9;
+/// Least number of cameras that show a place, if there are as many, and least share of all cameras.
+const FEWEST: usize = 3;
+const LEAST_SHARE: f32 = 0.25;
+/// Excess of the outline of a cube in a picture over that of a ball around it, for the border of the picture.
+const STRETCH: f32 = 1.25;
+
+/// The space that is searched.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Space {
+    /// The corner of least coordinates, world space.
+    low: Vec3,
+    /// Side of the smallest cubes, world units.
+    voxel: f32,
+    /// Halvings from the whole to the smallest cubes.
+    levels: u32,
+}
+
+impl Space {
+    /// Returns the space that cameras look at; `None` if they look at none.
+    pub(crate) fn of(cameras: &[Camera]) -> Option<Self> {
+        let views: Vec<View> = cameras.iter().map(|camera| camera.view(0.0, RasterFov::Corrected)).collect();
+        let region = Region::of(views.iter()).ok()?;
+        let projections = cameras.iter().map(Projection::of);
+        let pixel = |at: Projection| at.pixel(region.center).map(|(_, depth)| depth / at.focal);
+        let mut pixels: Vec<f32> = projections.filter_map(pixel).collect();
+        pixels.sort_unstable_by(f32::total_cmp);
+        let side = 2.0 * WIDER * region.half;
+        let voxel = (VOXEL * pixels.get(pixels.len() / 2)?).max(side / (1u32 << FINEST) as f32);
+        let levels = ((side / voxel).log2().ceil() as u32).clamp(COARSE, FINEST);
+        let low = region.center - 0.5 * voxel * (1u32 << levels) as f32;
+        (voxel > 0.0 && low.is_finite()).then_some(Self { low, voxel, levels })
+    }
+}
+
+/// The mask of a camera, with the number of pixels inside in every rectangle from its first pixel.
+pub(crate) struct Silhouette {
+    /// The camera.
+    pub projection: Projection,
+    sums: Vec<u32>,
+}
+
+/// What a mask says of a cube.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Evidence {
+    /// The picture does not show the cube.
+    Hidden,
+    /// No part of the cube is inside.
+    Outside,
+    /// A part of the cube may be inside.
+    Possible,
+}
+
+impl Silhouette {
+    /// Returns a silhouette; `None` if the mask has another size than the pictures of the camera.
+    pub(crate) fn new(camera: &Camera, mask: &GrayImage) -> Option<Self> {
+        if [mask.width(), mask.height()] != camera.size.to_array() {
+            return None;
+        }
+        let width = mask.width() as usize;
+        let mut sums = vec![0; (width + 1) * (mask.height() as usize + 1)];
+        for (y, row) in mask.as_raw().chunks_exact(width.max(1)).enumerate() {
+            let mut count = 0;
+            for (x, &value) in row.iter().enumerate() {
+                count += u32::from(value > INSIDE);
+                sums[(y + 1) * (width + 1) + x + 1] = sums[y * (width + 1) + x + 1] + count;
+            }
+        }
+        Some(Self { projection: Projection::of(camera), sums })
+    }
+
+    /// Returns whether a pixel of the picture is inside.
+    pub(crate) fn is_inside(&self, x: u32, y: u32) -> bool {
+        self.count([x, y], [x + 1, y + 1]) > 0
+    }
+
+    /// Returns the number of pixels inside from `low` to before `high`.
+    fn count(&self, low: [u32; 2], high: [u32; 2]) -> u32 {
+        let sum = |x: u32, y: u32| self.sums[y as usize * (self.projection.size.x as usize + 1) + x as usize];
+        sum(high[0], high[1]) + sum(low[0], low[1]) - sum(low[0], high[1]) - sum(high[0], low[1])
+    }
+
+    /// Returns what the mask says of a ball, world space.
+    fn evidence(&self, center: Vec3, radius: f32) -> Evidence {
+        let Some((at, depth)) = self.projection.pixel(center) else { return Evidence::Hidden };
+        if depth <= radius {
+            return Evidence::Possible;
+        }
+        let reach = Vec2::splat(STRETCH * radius * self.projection.focal / (depth - radius) + 1.0);
+        let (low, high, size) = (at - reach, at + reach, self.projection.size.as_vec2());
+        if low.cmpge(size).any() || high.cmple(Vec2::ZERO).any() {
+            return Evidence::Hidden;
+        }
+        let pixels = [low.floor(), high.ceil()].map(|corner| corner.clamp(Vec2::ZERO, size).as_uvec2().to_array());
+        let is_whole = low.cmpge(Vec2::ZERO).all() && high.cmple(size).all();
+        match self.count(pixels[0], pixels[1]) {
+            0 if is_whole => Evidence::Outside,
+            _ => Evidence::Possible,
+        }
+    }
+
+    /// Returns what the mask says of the center of a cube, world space.
+    fn evidence_at(&self, center: Vec3) -> Evidence {
+        match self.projection.shown(center) {
+            None => Evidence::Hidden,
+            Some((pixel, _)) if self.is_inside(pixel.x, pixel.y) => Evidence::Possible,
+            Some(_) => Evidence::Outside,
+        }
+    }
+}
+
+/// The surface of a visual hull.
+pub(crate) struct Hull {
+    /// Codes of its cubes, in Morton order.
+    pub cells: Vec<u64>,
+    /// Side of the cubes, world units.
+    pub side: f32,
+    /// The corner of least coordinates of the space, world space.
+    pub low: Vec3,
+}
+
+impl Hull {
+    /// Returns the hull of these silhouettes of one moment.
+    pub(crate) fn of<'a>(silhouettes: impl Iterator<Item = &'a Silhouette>, space: &Space) -> Self {
+        let silhouettes: Vec<&Silhouette> = silhouettes.collect();
+        let fewest = FEWEST.min(silhouettes.len()).max((LEAST_SHARE * silhouettes.len() as f32).ceil() as usize).max(2);
+        let is_kept = |evidence: &dyn Fn(&Silhouette) -> Evidence| {
+            let (mut shown, mut agreeing) = (0, 0);
+            for &silhouette in &silhouettes {
+                let evidence = evidence(silhouette);
+                shown += usize::from(evidence != Evidence::Hidden);
+                agreeing += usize::from(evidence == Evidence::Possible);
+            }
+            agreeing >= fewest && agreeing as f32 >= AGREEING * shown as f32
+        };
+        let mut hull = Self { cells: cells::all(COARSE), side: 0.0, low: space.low };
+        for level in COARSE..=space.levels {
+            hull.side = space.voxel * (1u32 << (space.levels - level)) as f32;
+            let radius = 0.5 * 3f32.sqrt() * hull.side;
+            let may_be_inside = |cell: &u64| {
+                let center = hull.place(*cell);
+                is_kept(&|silhouette: &Silhouette| silhouette.evidence(center, radius))
+            };
+            let kept: Vec<u64> = hull.cells.par_iter().copied().filter(may_be_inside).collect();
+            if level == space.levels || kept.len() > MOST_CELLS {
+                hull.cells = kept;
+                break;
+            }
+            hull.cells = cells::children(&kept);
+        }
+        let is_inside = |cell: &u64| {
+            let center = hull.place(*cell);
+            is_kept(&|silhouette: &Silhouette| silhouette.evidence_at(center))
+        };
+        let inside: Vec<u64> = hull.cells.par_iter().copied().filter(is_inside).collect();
+        hull.cells = cells::surface(&inside);
+        hull
+    }
+
+    /// Returns the center of a cube, world space.
+    pub(crate) fn place(&self, cell: u64) -> Vec3 {
+        self.low + (UVec3::from(cells::coordinates(cell)).as_vec3() + 0.5) * self.side
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fixture::{cameras, mask};
+    use super::*;
+
+    fn hull(cameras: &[Camera], masks: impl Fn(usize, &Camera) -> GrayImage) -> Hull {
+        let silhouette = |(index, camera): (usize, &Camera)| Silhouette::new(camera, &masks(index, camera));
+        let silhouettes: Vec<Silhouette> = cameras.iter().enumerate().filter_map(silhouette).collect();
+        assert_eq!(silhouettes.len(), cameras.len(), "masks of the size of the pictures");
+        Hull::of(silhouettes.iter(), &Space::of(cameras).expect("cameras that look at the origin"))
+    }
+
+    #[test]
+    fn the_hull_of_a_ball_is_its_surface_even_if_one_mask_of_twelve_misses_it() {
+        let center = Vec3::new(0.3, -0.2, 0.1);
+        let cameras = cameras(12);
+        let balls = [(center, 0.3)];
+        let missing = |index: usize, camera: &Camera| mask(camera, if index == 4 { &[] } else { &balls });
+        let found = hull(&cameras, missing);
+        assert!(found.cells.len() > 500, "many cubes: {}", found.cells.len());
+        for &cell in &found.cells {
+            let far = found.place(cell).distance(center);
+            assert!((0.22..0.42).contains(&far), "near the surface: {far}");
+        }
+    }
+
+    #[test]
+    fn a_ball_of_eight_pixels_is_found() {
+        // A pixel at the center is 4 * 0.73 / 200 wide.
+        let balls = [(Vec3::new(-0.6, 0.4, 0.3), 4.0 * 0.0146)];
+        let found = hull(&cameras(12), |_, camera| mask(camera, &balls));
+        assert!((40..400).contains(&found.cells.len()), "about a hundred cubes: {}", found.cells.len());
+        let mean = found.cells.iter().map(|&cell| found.place(cell)).sum::<Vec3>() / found.cells.len() as f32;
+        assert!(mean.distance(balls[0].0) < 0.015, "at its place: {mean}");
+    }
+
+    #[test]
+    fn empty_masks_have_no_hull() {
+        assert_eq!(hull(&cameras(6), |_, camera| mask(camera, &[])).cells.len(), 0, "nothing is inside");
+    }
+}
