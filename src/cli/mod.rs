@@ -28,8 +28,8 @@ use std::ffi::OsString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
 use verbs::{
-    ablate, bake, bench, compare, compress, convert, detail, eval, export, fine_tune, fleet, info, mask, prune, render,
-    score, synth, train,
+    ablate, bake, bench, compare, compress, convert, detail, eval, export, fine_tune, fleet, footage, info, join, mask,
+    prune, render, score, split, synth, train,
 };
 
 /// The exit code after a panic, a defect of this crate.
@@ -50,6 +50,7 @@ struct Cli {
 const EXAMPLES: &str = "\
 Examples:
   gs4d info chkpnt30000.pth
+  gs4d footage videos -o pictures                       # what several cameras filmed becomes a dataset
   gs4d bake pictures -o capture.gs4d                    # from a dataset: trains, prunes, compresses
   gs4d bake chkpnt30000.pth --data pictures -o capture.gs4d
   gs4d render capture.gs4d --orbit 60 --out frames
@@ -64,6 +65,8 @@ enum Verb {
     Render(render::Render),
     Compress(compress::Compress),
     Detail(detail::Detail),
+    Join(join::Join),
+    Split(split::SplitVerb),
     Compare(compare::Compare),
     Synth(synth::Synth),
     Bench(bench::Bench),
@@ -72,6 +75,7 @@ enum Verb {
     Mask(mask::Mask),
     Eval(eval::Eval),
     Ablate(ablate::Ablate),
+    Footage(footage::Footage),
     Train(train::Train),
     #[command(name = "finetune")]
     FineTune(fine_tune::FineTune),
@@ -89,6 +93,8 @@ impl Verb {
             Self::Render(verb) => verb.run(),
             Self::Compress(verb) => verb.run(),
             Self::Detail(verb) => verb.run(),
+            Self::Join(verb) => verb.run(),
+            Self::Split(verb) => verb.run(),
             Self::Compare(verb) => verb.run(),
             Self::Synth(verb) => verb.run(),
             Self::Bench(verb) => verb.run(),
@@ -97,6 +103,7 @@ impl Verb {
             Self::Mask(verb) => verb.run(),
             Self::Eval(verb) => verb.run(),
             Self::Ablate(verb) => verb.run(),
+            Self::Footage(verb) => verb.run(),
             Self::Train(verb) => verb.run(),
             Self::FineTune(verb) => verb.run(),
             Self::Bake(verb) => verb.run(),

@@ -53,7 +53,7 @@ pub fn gradients(
     let settings = GradientSettings {
         slice: *slice,
         sh_direction: scene.trained_with.sh_direction,
-        time_span: scene.trained_with.time_span(),
+        time_span: scene.trained_with.period_of_colors(),
         force_sh_3d: scene.trained_with.force_sh_3d,
         mode,
     };

@@ -30,6 +30,10 @@ pub struct TrainedWith {
     /// The marginal at and below which a Gaussian is not drawn, from 1/255 to below 1. Default: 0.05.
     #[serde(skip_serializing_if = "is_the_original_cutoff")]
     pub marginal_cutoff: f32,
+    /// Time after which colors that change with time repeat, timestamp units. Default: `None`, the length of the time
+    /// interval; a capture of segments that were trained apart has that of one segment.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub color_period: Option<f32>,
     /// Iteration of the checkpoint. Default: 0.
     pub iteration: u64,
     /// Extent of the training cameras, the factor of positional learning rates. Default: 1.
@@ -78,6 +82,7 @@ impl Default for TrainedWith {
             force_sh_3d: false,
             prefilter_var: -1.0,
             marginal_cutoff: MARGINAL_CUTOFF,
+            color_period: None,
             iteration: 0,
             spatial_lr_scale: 1.0,
             near: NEAR,
@@ -105,6 +110,11 @@ impl TrainedWith {
     /// Returns the length of the time interval, in the capture's unit.
     pub fn time_span(&self) -> f32 {
         self.time_interval[1] - self.time_interval[0]
+    }
+
+    /// Returns the time after which colors that change with time repeat, in the capture's unit.
+    pub fn period_of_colors(&self) -> f32 {
+        self.color_period.unwrap_or_else(|| self.time_span())
     }
 
     /// Returns whether footprints were shaped by the field-of-view sentinel of intrinsics cameras.

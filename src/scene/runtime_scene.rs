@@ -83,7 +83,7 @@ impl RuntimeScene {
     /// # Panics
     /// If `index` is out of range.
     pub fn color(&self, index: usize, direction: Vec3, tau: f32) -> Vec3 {
-        self.form.color(index, direction, tau, self.trained_with.time_span())
+        self.form.color(index, direction, tau, self.trained_with.period_of_colors())
     }
 
     /// Checks that its parts fit together, as those of every loaded scene do: lengths, codes, the temporal filter, the

@@ -3,6 +3,7 @@
 //! In: command lines, scenes and datasets made here, and the trained captures if `GS4D_DATA` names their folder. Out:
 //! one test binary. The header of each module names the verbs that it tests.
 
+mod bad_footage;
 mod bake;
 mod command;
 mod compare;
@@ -16,7 +17,9 @@ mod export;
 mod faults;
 mod fine_tune;
 mod fleet;
+mod footage;
 mod imports;
+mod join;
 #[cfg(target_os = "linux")]
 mod kills;
 mod options;

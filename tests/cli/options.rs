@@ -235,8 +235,13 @@ const REFUSED: &[(&str, &str)] = &[
     ("detail a -o o --resolution 2", "the following required arguments were not provided"),
     ("detail a -o o --static", "the following required arguments were not provided"),
     ("detail a -o o --trust-images", "the following required arguments were not provided"),
+    (
+        "join chunk-00001-of-00001.gs4d -o o --keep-times",
+        "--keep-times has no effect on the chunks of one capture; leave it out",
+    ),
     ("synth o --sh-degree 2 --sh-degree-t 1", "--sh-degree-t has no effect with --sh-degree below 3"),
     ("convert a o --sh-degree 2 --sh-degree-t 1", "--sh-degree-t has no effect with --sh-degree below 3"),
+    ("footage a -o o --sync no --offset b=1", "the argument '--"),
     ("synth o --grow 2 a --count 3", "the argument '--grow <K> <CAPTURE>' cannot be used with '--count <N>'"),
     (
         "synth o --grow 2 a --duration 3",
@@ -395,6 +400,7 @@ const ACCEPTED: &[&str] = &[
 /// The options of each verb that always have an effect, or are refused by their values alone.
 const ALWAYS: &[(&str, &[&str])] = &[
     ("info", &[]),
+    ("footage", &["--masks", "--out", "--rehearse", "--sync", "--test", "--work-size"]),
     (
         "convert",
         &[
@@ -480,6 +486,8 @@ const ALWAYS: &[(&str, &[&str])] = &[
         ],
     ),
     ("compare", &[]),
+    ("join", &["--level", "--out"]),
+    ("split", &["--chunk", "--level", "--out"]),
     ("synth", &["--grow", "--level", "--out", "--seed", "--sh-degree"]),
     (
         "bench",

@@ -6,9 +6,11 @@ use crate::offline::bake::BakeError;
 use crate::offline::dataset::{DatasetError, FrameProblem};
 use crate::offline::draw::DrawError;
 use crate::offline::engine::{EngineError, Purpose};
+use crate::offline::footage::FootageError;
 use crate::offline::forms::FormError;
 use crate::offline::measure::MeasureError;
 use crate::offline::prune::{PruneError, ValidatedChoice};
+use crate::offline::segments::{SegmentsError, Shared};
 use crate::offline::store::StoreError;
 use crate::offline::train::{StartError, TrainError, TrainerError};
 use std::error::Error;
@@ -19,8 +21,21 @@ type AnyError = dyn Error + 'static;
 
 /// The remedies, a function for each type of error. It returns the remedy with the punctuation before it; `None` for
 /// errors of other types and errors without a remedy.
-const REMEDIES: [fn(&AnyError) -> Option<String>; 11] =
-    [of_engine, of_dataset, of_form, of_store, of_measure, of_prune, of_train, of_trainer, of_start, of_draw, of_bake];
+const REMEDIES: [fn(&AnyError) -> Option<String>; 13] = [
+    of_engine,
+    of_dataset,
+    of_form,
+    of_store,
+    of_measure,
+    of_prune,
+    of_train,
+    of_trainer,
+    of_start,
+    of_draw,
+    of_footage,
+    of_segments,
+    of_bake,
+];
 
 /// What makes the Gaussians that are trained fewer or smaller.
 const FEWER: &str = "--gaussians makes them fewer, gs4d train --sh-degree smaller";
@@ -158,6 +173,42 @@ fn of_draw(error: &AnyError) -> Option<String> {
     }
 }
 
+fn of_footage(error: &AnyError) -> Option<String> {
+    match error.downcast_ref::<FootageError>()? {
+        FootageError::NothingToTrainOn => Some(" with --test".to_owned()),
+        FootageError::NoMasks { .. } => Some("; without --masks, what differs from the plates moves".to_owned()),
+        FootageError::Train(_) => Some("; without --rehearse nothing is trained".to_owned()),
+        _ => None,
+    }
+}
+
+fn of_segments(error: &AnyError) -> Option<String> {
+    let remedy = match error.downcast_ref::<SegmentsError>()? {
+        SegmentsError::Packed { .. } => " (gs4d bake --quality lossless writes one)",
+        SegmentsError::Differs { what, .. } => of_shared(*what)?,
+        SegmentsError::Still { .. } => " (gs4d convert --duration)",
+        SegmentsError::Overlap { .. } => "; without --keep-times, it begins then",
+        SegmentsError::Speed { .. } => "; without --keep-times, it is stretched",
+        _ => return None,
+    };
+    Some(remedy.to_owned())
+}
+
+/// Returns what makes a setting of segments the same.
+fn of_shared(what: Shared) -> Option<&'static str> {
+    match what {
+        Shared::Background => Some(": gs4d convert --background replaces it"),
+        Shared::Up => Some(": gs4d convert --up replaces it"),
+        Shared::Cutoff => Some(": gs4d convert --cutoff replaces it"),
+        Shared::RasterFov => Some(": gs4d convert --raster-fov replaces it"),
+        Shared::Cameras => Some(": gs4d convert --trained-cameras replaces it"),
+        Shared::ShDirection => Some(": gs4d convert --sh-direction replaces it"),
+        Shared::Degrees => Some(": lower the higher one with gs4d convert --sh-degree --sh-degree-t"),
+        Shared::ColorPeriod => Some(": gs4d convert --sh-degree-t 0 makes the colors of all rest"),
+        _ => None,
+    }
+}
+
 fn of_bake(error: &AnyError) -> Option<String> {
     match error.downcast_ref::<BakeError>()? {
         BakeError::MissingShard { shard, .. } => Some(format!(": run --only score --shard {shard} before")),
@@ -184,8 +235,9 @@ mod tests {
     fn the_remedy_follows_the_message_of_the_error() {
         let folder = || PathBuf::from("out.bake");
         let frame = FrameProblem::NoTime("a.png".to_owned());
-        let errors: [(Box<dyn Error>, &str); 8] = [
+        let errors: [(Box<dyn Error>, &str); 9] = [
             (TrainError::WithoutGpu.into(), "needs a GPU; --engine gpu takes one with a software driver, slowly"),
+            (FootageError::from(TrainError::WithoutGpu).into(), "needs a GPU; without --rehearse nothing is trained"),
             (FormError::NotTrained.into(), "to the trained form: convert the checkpoint with --form trained"),
             (
                 StoreError::MissingStage { folder: folder(), stage: "score", only: "prune" }.into(),

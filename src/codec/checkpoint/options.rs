@@ -69,6 +69,9 @@ pub fn describe(trained_with: &TrainedWith, playback: &PlaybackHints) -> Vec<(&'
     if trained_with.near != NEAR {
         pairs.push(("near limit", format!("{} units", trained_with.near)));
     }
+    if let Some(period) = trained_with.color_period {
+        pairs.push(("colors repeat after", format!("{period} units of time")));
+    }
     if trained_with.mip_filter {
         pairs.push(("filter", "Mip-Splatting".to_owned()));
     }

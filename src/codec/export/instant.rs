@@ -17,7 +17,7 @@ use rayon::prelude::*;
 /// The first Gaussian that cannot be drawn.
 pub(crate) fn at(scene: &GaussianScene, time: f32) -> Result<Columns, InvalidGaussian> {
     let ready = Ready::of(scene)?;
-    let (cutoff, span) = (scene.trained_with.marginal_cutoff, scene.trained_with.time_span());
+    let (cutoff, span) = (scene.trained_with.marginal_cutoff, scene.trained_with.period_of_colors());
     let active =
         scene.filter.as_ref().map(|filter| (filter, filter.segment_of(time, scene.trained_with.time_interval)));
     let is_drawn = |&index: &usize| {

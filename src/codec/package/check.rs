@@ -112,6 +112,10 @@ impl Header {
             (SMALLEST_CUTOFF..1.0).contains(&trained.marginal_cutoff),
             "a cut-off of the marginal that is not from 1/255 to below 1",
         )?;
+        sane(
+            trained.color_period.is_none_or(|period| period.is_finite() && period > 0.0),
+            "a period of colors that is not positive and finite",
+        )?;
         sane(trained.near.is_finite() && trained.near > 0.0, "a near limit that is not positive and finite")?;
         sane(
             trained.pixel.is_none_or(|pixel| pixel.is_finite() && pixel > 0.0),

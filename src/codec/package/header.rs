@@ -120,7 +120,7 @@ pub struct StoredFilter {
 }
 
 /// Names of the features that packages of this version may require.
-const FEATURES: [&str; 5] = ["packed", "filter", "cutoff", "near", "mip_filter"];
+const FEATURES: [&str; 6] = ["packed", "filter", "cutoff", "near", "mip_filter", "color_period"];
 
 /// Size of an environment map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -143,10 +143,11 @@ impl Header {
     pub(super) fn of(scene: &GaussianScene) -> Self {
         let form = StoredForm::of(&scene.form);
         let ColorDegrees { coefficients, degree, degree_t } = scene.form.color_degrees();
-        let TrainedWith { marginal_cutoff, near, mip_filter, .. } = scene.trained_with;
+        let TrainedWith { marginal_cutoff, near, mip_filter, color_period, .. } = scene.trained_with;
         let is_packed = matches!(form, StoredForm::Packed { .. });
         let is_cut_elsewhere = marginal_cutoff != MARGINAL_CUTOFF;
-        let used = [is_packed, scene.filter.is_some(), is_cut_elsewhere, near != NEAR, mip_filter];
+        let repeats = color_period.is_some();
+        let used = [is_packed, scene.filter.is_some(), is_cut_elsewhere, near != NEAR, mip_filter, repeats];
         let requires = FEATURES.iter().zip(used).filter(|(_, used)| *used).map(|(name, _)| (*name).to_owned());
         Self {
             generator: concat!("bevy_gs4d ", env!("CARGO_PKG_VERSION")).to_owned(),

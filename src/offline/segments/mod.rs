@@ -1,0 +1,36 @@
+//! Segments: long captures from short ones, and their cut into stretches of time.
+//!
+//! In: captures that were trained apart, each of a stretch of time, or one capture. Out: one capture of all segments, in
+//! which each Gaussian is only drawn within the time of its segment; or chunks of one capture, each a capture of the
+//! Gaussians that are alive in a stretch of time, and from the chunks the capture again.
+//!
+//! | file | subject |
+//! |---|---|
+//! | `clock` | where each segment begins on the clock of all, and the segments of the filter |
+//! | `windows` | the filter segments in which each Gaussian may be drawn |
+//! | `forms` | Gaussians are moved in time and space, and appended |
+//! | `alike` | what segments must have in common |
+//! | `join` | one capture of segments |
+//! | `files` | the names of chunk files, and which paths are chunks of one capture |
+//! | `covers` | runs: the Gaussians of a stretch of chunks |
+//! | `split` | chunk files of a capture |
+//! | `unite` | the capture of chunks |
+
+mod alike;
+mod clock;
+mod covers;
+mod error;
+mod files;
+mod forms;
+mod join;
+mod segment;
+mod split;
+mod unite;
+mod windows;
+
+pub use error::{SegmentsError, Shared};
+pub use files::{Source, sources};
+pub use join::{Joined, JoinedSegment, Times, join};
+pub use segment::Segment;
+pub use split::{Chunk, MOST_CHUNKS, Split, other_chunk};
+pub use unite::unite;
