@@ -126,7 +126,7 @@
 //! [`asset`] loads and reloads files, and reports their states. [`picker`] finds the Gaussian that a ray hits.
 //! [`stereo`] has two eyes on one head. [`inspector`] is a panel that shows and edits captures, [`testing`] renders an
 //! app to pictures without a window. `docs/guide.md` is the guide for games, `docs/command.md` the guide of the
-//! command.
+//! command, `docs/filming.md` the chapter from several cameras to a capture.
 //!
 //! [`GaussianCapturePlugins`] is a group: `GaussianCapturePlugins.build().disable::<CapturePbrPlugin>()` leaves a part
 //! out. All components and resources are reflected and registered by their public paths, for scene files.
