@@ -28,7 +28,6 @@ mod shaders;
 mod thin;
 mod tile_bins;
 mod train;
-mod train_coarse;
 mod train_parts;
 mod train_repair;
 mod train_standing;

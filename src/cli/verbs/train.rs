@@ -19,8 +19,8 @@ use crate::offline::measure::belonging::require_belonging_on_gpu;
 use crate::offline::store::outputs::Files;
 use crate::offline::store::results::Store;
 use crate::offline::train::{
-    Births, CaptureSettings, Cloning, FineTuneSettings, FineTuned, Floaters, Growth, Rates, Start, StartSettings,
-    Terms, TrainSettings, TrainedCapture, Training, Usual,
+    Births, CaptureSettings, Cloning, Coarse, FineTuneSettings, FineTuned, Floaters, Growth, Rates, Start,
+    StartSettings, Terms, TrainSettings, TrainedCapture, Training, Usual,
 };
 use serde_json::json;
 use std::path::PathBuf;
@@ -141,7 +141,7 @@ pub(crate) struct Train {
     start_velocity: bool,
     /// Train on a quarter of the size of each side at first, then on half, where the longer side of pictures has more
     /// than 1000 pixels.
-    #[arg(long, value_name = "SWITCH", default_value = "on", action = clap::ArgAction::Set, value_parser = values::switch())]
+    #[arg(long, help_heading = "Experimental", value_name = "SWITCH", default_value = "off", action = clap::ArgAction::Set, value_parser = values::switch())]
     coarse: bool,
     /// Steps between two relocations of the Gaussians that have faded; 0: none is relocated.
     #[arg(long, value_name = "N", default_value = "100")]
@@ -195,6 +195,7 @@ impl Train {
     /// # Errors
     /// Views that cannot be used, a package that cannot be written, a failure of the GPU.
     pub(crate) fn run(&self) -> Result<Report, Failure> {
+        self.check_options()?;
         let out = self.package.checked_file(self.data.add_to(Files::default()).reads(&self.points))?;
         let store = Store::beside(out, ".train")?;
         let progress = &mut Bars::default();
@@ -208,7 +209,6 @@ impl Train {
             steps: self.steps.unwrap_or(usual.steps),
             ..usual
         };
-        self.check_options(&usual)?;
         let settings = self.settings(data, &usual);
         let training = Training::open(&settings, progress)?;
         let Splits { train, validation, .. } = training.splits();
@@ -280,14 +280,14 @@ impl Train {
     }
 
     /// Checks that every option has an effect.
-    fn check_options(&self, usual: &Usual) -> Result<(), Failure> {
+    fn check_options(&self) -> Result<(), Failure> {
         let relocates = self.densify == Densify::Relocate;
         let needs = [
             (Need::ValidationViews, self.validation != Validation::None),
             (Need::Relocation, relocates),
             (Need::FixedNumber, relocates),
             (Need::StartAtPoints, !matches!(self.start, Start::Hull | Start::Random)),
-            (Need::CheckedSteps, usual.steps >= CHECKED),
+            (Need::CheckedSteps, self.steps.is_none_or(|steps| steps >= CHECKED)),
             (Need::Degrees, self.sh_degree > 0),
             (Need::ColorInTime, self.sh_degree >= 3),
         ];
@@ -367,7 +367,7 @@ impl Train {
         FineTuneSettings {
             exposure: self.training.exposure.unwrap_or(tuning.exposure),
             standing: self.standing,
-            coarse: tuning.coarse.filter(|_| self.coarse),
+            coarse: self.coarse.then(Coarse::default),
             growth: tuning.growth.map(growth),
             ..tuning
         }

@@ -8,7 +8,6 @@
 
 use super::error::TrainError;
 use super::every_view::every_view;
-use super::images::Coarse;
 use super::settings::FineTuneSettings;
 use crate::offline::dataset::TrainingView;
 use crate::offline::dataset::selection::{distinct_cameras, distinct_times};
@@ -64,7 +63,7 @@ impl Usual {
 
     /// Returns these settings with the parts that pay for the dataset.
     pub fn with_parts(&self, tuning: FineTuneSettings) -> FineTuneSettings {
-        FineTuneSettings { exposure: self.is_rig, coarse: Some(Coarse::default()), ..tuning }
+        FineTuneSettings { exposure: self.is_rig, ..tuning }
     }
 }
 
