@@ -226,8 +226,8 @@ fn a_bake_trains_exposures_and_an_environment_map_on_request() {
         let trained = capture.path(&format!("{name}.trained.gs4d"));
         (gs4d(&arguments!["info", &trained, "--json"]).json(), fs::read(trained).expect("the trained capture"))
     };
-    let (_, plain) = bake("plain", &[]);
-    let (info, with_map) = bake("map", &["--environment", "4"]);
+    let (_, plain) = bake("plain", &["--exposure=off"]);
+    let (info, with_map) = bake("map", &["--exposure=off", "--environment", "4"]);
     assert_eq!(info["environment"], json!([8, 4]), "twice as wide as high: {info}");
     let (info, _) = bake("red", &["--background", "1,0,0"]);
     assert_eq!(info["environment"], json!([64, 32]), "black borders are surroundings before red: {info}");
