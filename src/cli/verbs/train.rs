@@ -339,37 +339,25 @@ impl Train {
             Densify::Original => (Growth::original(usual.steps, usual.gaussians), 0.0),
         };
         let (opacity, scale) = (self.opacity_weight.unwrap_or(weight), self.scale_weight.unwrap_or(weight));
-        let tuning = FineTuneSettings {
+        FineTuneSettings {
             steps: usual.steps,
             rates: Rates { mean: Rates::OURS.mean * self.mean_rate, ..Rates::OURS },
             last_rate: self.last_rate,
             similarity_share: self.similarity,
             terms: Terms { opacity, scale, ..shared.terms },
+            exposure: self.training.exposure.unwrap_or(usual.is_rig),
+            standing: self.standing,
+            coarse: self.coarse.then(Coarse::default),
             evaluate_every: self.evaluate_every,
             growth: Some(Growth {
                 least_time_scale: self.least_time_scale,
                 last_mean_rate: self.last_mean_rate,
                 raise_every: self.raise_degree_every.unwrap_or(growth.raise_every),
+                births: (self.births > 0).then(|| Births { most: self.births, ..Births::over(usual.steps) }),
+                floaters: self.floaters.then(|| Floaters::over(usual.steps)),
                 ..growth
             }),
             ..shared
-        };
-        self.with_parts(usual.with_parts(tuning))
-    }
-
-    /// Returns the settings with the parts that options ask for.
-    fn with_parts(&self, tuning: FineTuneSettings) -> FineTuneSettings {
-        let growth = |growth: Growth| Growth {
-            births: (self.births > 0).then(|| Births { most: self.births, ..Births::over(tuning.steps) }),
-            floaters: self.floaters.then(|| Floaters::over(tuning.steps)),
-            ..growth
-        };
-        FineTuneSettings {
-            exposure: self.training.exposure.unwrap_or(tuning.exposure),
-            standing: self.standing,
-            coarse: self.coarse.then(Coarse::default),
-            growth: tuning.growth.map(growth),
-            ..tuning
         }
     }
 }

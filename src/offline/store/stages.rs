@@ -192,23 +192,7 @@ impl<'a> Stages<'a> {
 mod tests {
     use super::*;
     use crate::offline::work::NoProgress;
-
-    /// Is interrupted from the beginning.
-    struct Interrupting;
-
-    impl Progress for Interrupting {
-        fn begin(&mut self, _task: &'static str, _steps: usize) {}
-
-        fn advance(&mut self) {}
-
-        fn finish(&mut self) {}
-
-        fn note(&mut self, _line: &str) {}
-
-        fn is_interrupted(&self) -> bool {
-            true
-        }
-    }
+    use crate::offline::work::progress::InterruptedProgress;
 
     #[test]
     fn a_stage_runs_once_for_each_input() {
@@ -258,7 +242,7 @@ mod tests {
     fn an_interrupted_stage_is_an_error() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let store = Store::beside(&folder.path().join("scene.gs4d"), ".bake").expect("the folder can be made");
-        let mut interrupting = Interrupting;
+        let mut interrupting = InterruptedProgress;
         let mut stages = Stages::begin("test", 1, &store, &mut interrupting);
         let result = stages.run::<_, StoreError>("stage", Key::of(b""), |_| true, |_| Ok(Vec::<u8>::new()));
         assert!(matches!(result, Err(StoreError::Interrupted(_))), "a stage whose result is stored does not run");

@@ -114,7 +114,7 @@ impl TrainSettings {
     /// Returns the usual settings for a dataset, with its usual choices.
     pub fn usual(data: PathBuf, splits: SplitOptions, usual: &Usual) -> Self {
         let start = StartSettings { gaussians: usual.gaussians, ..StartSettings::default() };
-        let tuning = usual.with_parts(Self::tuning(usual.steps));
+        let tuning = FineTuneSettings { exposure: usual.is_rig, ..Self::tuning(usual.steps) };
         Self { data, splits, capture: CaptureSettings::default(), start, points: None, tuning, save_every: 5000 }
     }
 }

@@ -1,14 +1,14 @@
 //! What a training is asked for where its caller chooses nothing.
 //!
-//! In: the training views of a dataset. Out: [`Usual`]: the number of Gaussians and of steps, and the parts of training
-//! that pay on what real cameras filmed.
+//! In: the training views of a dataset. Out: [`Usual`]: the number of Gaussians and of steps, and whether real cameras
+//! may have filmed it.
 //!
 //! A *rig* is several cameras that stand still and see the same moments, each with an image that covers all of its
-//! pixels. Its pictures differ in exposure and white balance, and its moments share what stands. All other datasets, such as a camera that moves around a synthetic scene, are trained as in the paper.
+//! pixels. Its pictures differ in exposure and white balance, and its moments share what stands. All other datasets, such
+//! as a camera that moves around a synthetic scene, are trained as in the paper.
 
 use super::error::TrainError;
 use super::every_view::every_view;
-use super::settings::FineTuneSettings;
 use crate::offline::dataset::TrainingView;
 use crate::offline::dataset::selection::{distinct_cameras, distinct_times};
 use crate::offline::dataset::splits::SplitOptions;
@@ -59,11 +59,6 @@ impl Usual {
     /// Views that cannot be used.
     pub fn read(data: &Path, options: &SplitOptions, progress: &mut dyn Progress) -> Result<Self, TrainError> {
         Ok(Self::of(&every_view(data, options, progress)?.views))
-    }
-
-    /// Returns these settings with the parts that pay for the dataset.
-    pub fn with_parts(&self, tuning: FineTuneSettings) -> FineTuneSettings {
-        FineTuneSettings { exposure: self.is_rig, ..tuning }
     }
 }
 

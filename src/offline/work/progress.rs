@@ -54,3 +54,22 @@ impl Progress for NoProgress {
 
     fn note(&mut self, _line: &str) {}
 }
+
+/// Is interrupted from the beginning.
+#[cfg(test)]
+pub(crate) struct InterruptedProgress;
+
+#[cfg(test)]
+impl Progress for InterruptedProgress {
+    fn begin(&mut self, _task: &'static str, _steps: usize) {}
+
+    fn advance(&mut self) {}
+
+    fn finish(&mut self) {}
+
+    fn note(&mut self, _line: &str) {}
+
+    fn is_interrupted(&self) -> bool {
+        true
+    }
+}

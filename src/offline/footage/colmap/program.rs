@@ -214,23 +214,8 @@ mod tests {
     mod steps {
         use super::*;
         use crate::offline::work::NoProgress;
+        use crate::offline::work::progress::InterruptedProgress;
         use std::time::Instant;
-
-        struct Interrupted;
-
-        impl Progress for Interrupted {
-            fn begin(&mut self, _task: &'static str, _steps: usize) {}
-
-            fn advance(&mut self) {}
-
-            fn finish(&mut self) {}
-
-            fn note(&mut self, _line: &str) {}
-
-            fn is_interrupted(&self) -> bool {
-                true
-            }
-        }
 
         /// Runs a script of the shell as a step.
         fn ran(script: &'static [&'static str], progress: &dyn Progress) -> Result<String, ColmapError> {
@@ -242,7 +227,7 @@ mod tests {
         #[test]
         fn an_interruption_ends_a_step() {
             let start = Instant::now();
-            let error = ran(&["-c", "exec sleep 60"], &Interrupted).expect_err("the work is interrupted");
+            let error = ran(&["-c", "exec sleep 60"], &InterruptedProgress).expect_err("the work is interrupted");
             assert!(matches!(error, ColmapError::Interrupted(_)), "the reason: {error}");
             assert!(start.elapsed() < Duration::from_secs(20), "it was not waited for: {:?}", start.elapsed());
         }

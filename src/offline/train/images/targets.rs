@@ -94,9 +94,13 @@ impl TrainingImages {
         let mut images = Self::unread(views, validation, trained_with, room)?;
         let first = images.first.clone();
         images.fill(&first, room.all, progress)?;
-        let has_gaps = images.first().any(|(_, image)| image.has_gaps);
-        images.has_gaps = has_gaps;
-        Ok(images)
+        Ok(images.with_gaps())
+    }
+
+    /// Returns these images, which know whether one of those that a training begins with has gaps.
+    fn with_gaps(self) -> Self {
+        let has_gaps = self.first().any(|(_, image)| image.has_gaps);
+        Self { has_gaps, ..self }
     }
 
     /// Loads the images that a training begins with; the others are loaded at the sizes that are trained on
@@ -113,9 +117,7 @@ impl TrainingImages {
     ) -> Result<Self, TrainError> {
         let mut images = Self::unread(views, validation, trained_with, room)?;
         load(&mut images.shots, &images.views, &images.first, progress)?;
-        let has_gaps = images.first().any(|(_, image)| image.has_gaps);
-        images.has_gaps = has_gaps;
-        Ok(images)
+        Ok(images.with_gaps())
     }
 
     /// Returns the views, with no image in memory.

@@ -5,8 +5,9 @@
 //! behind them if the images show surroundings, or on request.
 //!
 //! Opacity is 0.1; the spatial scale is the root of the mean squared distance to the three nearest points, of the same
-//! time where points have times; the temporal scale is a share of the interval, and three intervals for points of what
-//! stands; Gaussians have the velocity of their point, and are not rotated otherwise (section 5.4 of the 4DGS model).
+//! time where there are many of each; the temporal scale is a share of the interval; no Gaussian is rotated or moves
+//! (section 5.4 of the 4DGS model). On request Gaussians have the velocities of their points, and those at points of
+//! what stands a temporal scale of three intervals.
 
 use super::error::StartError;
 use super::gaussians::{Looks, trained};
