@@ -4,7 +4,7 @@
 //! size and half of its rate, which the installed `ffmpeg` makes once. Out: proof that each fault, put into a copy of
 //! it, is named with the camera that has it, and that the unchanged take has no grave finding.
 
-use crate::support::command::{GS4D, Run, arguments, folder};
+use crate::support::command::{arguments, folder, gs4d};
 use crate::support::data::data;
 use crate::support::skip::skip;
 use image::RgbImage;
@@ -152,14 +152,12 @@ impl Take {
     /// Returns the findings on such footage; `None` if the videos are not there.
     fn findings(&self, shows: impl Fn(usize, usize) -> Shows) -> Option<Vec<Value>> {
         let folder = folder();
-        let [take, out, empty] = ["take", "dataset", "empty"].map(|name| folder.path().join(name));
+        let [take, out] = ["take", "dataset"].map(|name| folder.path().join(name));
         fs::create_dir(&take).expect("the folder can be made");
         self.write(&take, shows)?;
         let size = self.work_size.to_string();
-        let line = arguments!["footage", &take, "-o", &out, "--work-size", size, "--json"];
-        // Without the programs of the system, COLMAP is not looked for points with.
-        let output = Command::new(GS4D).args(line).env("PATH", &empty).output().expect("the command starts");
-        let made = Run::of(&output).json();
+        let line = arguments!["footage", &take, "-o", &out, "--work-size", size, "--no-points", "--json"];
+        let made = gs4d(&line).json();
         Some(made["verdict"]["findings"].as_array().expect("a list of findings").clone())
     }
 }

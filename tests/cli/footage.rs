@@ -129,6 +129,12 @@ fn footage_becomes_a_dataset_once() {
     fs::remove_file(out.join("motion/2/000001.png")).expect("the mask is there");
     make();
     assert_eq!(contents(&out), written, "a result that is gone is made again");
+
+    let without = gs4d(&arguments!["footage", &footage, "-o", &out, "--no-points", "--json"]).json();
+    assert_eq!(without["points"], 0, "no points are looked for");
+    assert!(!out.join("points3d.ply").exists(), "those of the run before are gone");
+    make();
+    assert_eq!(contents(&out), written, "they are found again");
 }
 
 #[test]

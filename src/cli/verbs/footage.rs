@@ -58,9 +58,13 @@ pub(crate) struct Footage {
     /// if there is one; else what differs from the plates].
     #[arg(long, value_name = "MASKS")]
     masks: Option<PathBuf>,
+    /// Leave out the points of every moment, which take most of the time: for a first verdict on a take. A training would
+    /// begin at random points; the same command without this option adds them.
+    #[arg(long)]
+    no_points: bool,
     /// Train shortly on the dataset without some of its cameras, so that the verdict tells what quality to expect: 1000
     /// steps of 30,000 Gaussians, on pictures of at most 320 pixels. Needs a GPU.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "no_points")]
     rehearse: bool,
 }
 
@@ -88,7 +92,7 @@ impl Footage {
     fn settings(&self) -> FootageSettings {
         let is_none = |names: &Vec<String>| names.len() == 1 && names[0] == NONE;
         let test = self.test.clone().map(|names| if is_none(&names) { Vec::new() } else { names });
-        let Self { folder, out, sync, offset, work_size, masks, rehearse, .. } = self;
+        let Self { folder, out, sync, offset, work_size, masks, no_points, rehearse, .. } = self;
         FootageSettings {
             folder: folder.clone(),
             out: out.clone(),
@@ -97,6 +101,7 @@ impl Footage {
             test,
             work_size: *work_size,
             masks: masks.clone(),
+            points: !no_points,
             rehearse: *rehearse,
         }
     }

@@ -53,6 +53,20 @@ pub struct Correction {
     pub(super) masks: bool,
 }
 
+/// The image of a training view before it is resized: colors times alpha, and coverage. Its distortion is undone.
+#[derive(Debug, Clone)]
+struct Whole {
+    colors: Channels<3>,
+    coverage: Channels<1>,
+}
+
+/// Interleaved bytes of so many channels.
+#[derive(Debug, Clone)]
+struct Channels<const N: usize> {
+    bytes: Vec<u8>,
+    size: UVec2,
+}
+
 /// The image of a training view and its coverage, at its camera's size.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoveredImage {
@@ -86,9 +100,23 @@ impl TrainingView {
     /// is a frame that was decoded from a video, [`DatasetError::Size`] if the size of the camera is out of range.
     pub fn load_covered(&self) -> Result<CoveredImage, DatasetError> {
         let size = self.camera.size;
-        if size.min_element() == 0 || size.max_element() > MAX_SIDE {
-            return Err(DatasetError::Size { size });
-        }
+        check_size(size)?;
+        Ok(self.load_whole()?.resized(size))
+    }
+
+    /// Loads the image and its coverage at each of these sizes, pixels, and decodes it once: each is what
+    /// [`load_covered`](Self::load_covered) returns for a camera of that size.
+    ///
+    /// # Errors
+    /// Those of [`load_covered`](Self::load_covered).
+    pub(crate) fn load_sizes(&self, sizes: &[UVec2]) -> Result<Vec<CoveredImage>, DatasetError> {
+        sizes.iter().try_for_each(|&size| check_size(size))?;
+        let whole = self.load_whole()?;
+        Ok(sizes.iter().map(|&size| whole.clone().resized(size)).collect())
+    }
+
+    /// Loads the image and its coverage, and undoes the distortion.
+    fn load_whole(&self) -> Result<Whole, DatasetError> {
         require_files([Some(&self.image), self.mask.as_ref()].into_iter().flatten())?;
         let mut image = self.decode(&self.image)?.into_rgba8();
         let from = UVec2::new(image.width(), image.height());
@@ -98,28 +126,24 @@ impl TrainingView {
         {
             multiply_alpha(&mut image, &mask);
         }
-        let colors = self.at_camera(premultiplied(&image), 3, from);
+        let colors = self.undistorted(premultiplied(&image), from);
         let coverage = match mask {
             Some(mask) => {
                 let from = UVec2::new(mask.width(), mask.height());
-                self.at_camera(mask.into_raw(), 1, from)
+                self.undistorted(mask.into_raw(), from)
             }
-            None => self.at_camera(image.pixels().map(|pixel| pixel.0[3]).collect(), 1, from),
+            None => self.undistorted(image.pixels().map(|pixel| pixel.0[3]).collect(), from),
         };
-        let texels =
-            colors.chunks_exact(3).zip(coverage).map(|(color, covered)| [color[0], color[1], color[2], covered]);
-        let texels: Vec<[u8; 4]> = texels.collect();
-        let has_gaps = texels.iter().any(|texel| texel[3] < u8::MAX);
-        Ok(CoveredImage { size, texels, has_gaps })
+        Ok(Whole { colors, coverage })
     }
 
-    /// Undoes the distortion, and resizes to the size of the camera.
-    fn at_camera(&self, bytes: Vec<u8>, channels: usize, from: UVec2) -> Vec<u8> {
+    /// Undoes the distortion.
+    fn undistorted<const N: usize>(&self, bytes: Vec<u8>, size: UVec2) -> Channels<N> {
         let bytes = match &self.correction.undistortion {
-            Some(undistortion) => undistortion.undistort(&bytes, channels, from),
+            Some(undistortion) => undistortion.undistort(&bytes, N, size),
             None => bytes,
         };
-        resample::resize(bytes, channels, from, self.camera.size)
+        Channels { bytes, size }
     }
 
     /// Decodes the image or the mask.
@@ -136,6 +160,29 @@ impl TrainingView {
             Err(DatasetError::Aspect { path: path.to_owned(), size, expected })
         }
     }
+}
+
+impl Whole {
+    /// Resizes the image.
+    fn resized(self, size: UVec2) -> CoveredImage {
+        let (colors, coverage) = (self.colors.resized(size), self.coverage.resized(size));
+        let texels =
+            colors.chunks_exact(3).zip(coverage).map(|(color, covered)| [color[0], color[1], color[2], covered]);
+        let texels: Vec<[u8; 4]> = texels.collect();
+        let has_gaps = texels.iter().any(|texel| texel[3] < u8::MAX);
+        CoveredImage { size, texels, has_gaps }
+    }
+}
+
+impl<const N: usize> Channels<N> {
+    fn resized(self, size: UVec2) -> Vec<u8> {
+        resample::resize(self.bytes, N, self.size, size)
+    }
+}
+
+/// Checks that pictures may have this size.
+fn check_size(size: UVec2) -> Result<(), DatasetError> {
+    if size.min_element() == 0 || size.max_element() > MAX_SIDE { Err(DatasetError::Size { size }) } else { Ok(()) }
 }
 
 /// Returns whether one of two sizes, scaled to the width or the height of the other, differs from it by at most one

@@ -7,6 +7,7 @@
 //! |---|---|
 //! | `settings` | what is made, and how |
 //! | `take` | the frames of cameras to work with, by moments |
+//! | `working` | their pictures at the sizes to work with, decoded once |
 //! | `sync` | the offsets between the clocks of cameras |
 //! | `colmap` | poses by the program COLMAP |
 //! | `plates` | what stands still before a camera, and what moves |
@@ -23,6 +24,7 @@ mod settings;
 mod sync;
 mod take;
 mod verdict;
+mod working;
 
 pub use colmap::ColmapError;
 pub use error::FootageError;

@@ -25,6 +25,9 @@ pub struct FootageSettings {
     /// The folder of masks of what moves, `CAMERA/FRAME.png`; `None` takes `seg` or `motion` in the folder of the
     /// footage if there is one, and else tells what moves from the plates.
     pub masks: Option<PathBuf>,
+    /// Whether points of every moment are looked for, which takes most of the time. Without them a training begins at
+    /// random points.
+    pub points: bool,
     /// Whether a short training on a GPU, without some of the cameras, tells the verdict what quality to expect.
     pub rehearse: bool,
 }
@@ -36,7 +39,17 @@ impl FootageSettings {
     /// Returns the usual settings.
     pub fn usual(folder: PathBuf, out: PathBuf) -> Self {
         let (sync, work_size) = (Synchronization::Auto, Self::WORK_SIZE);
-        Self { folder, out, sync, offsets: Vec::new(), test: None, work_size, masks: None, rehearse: false }
+        Self {
+            folder,
+            out,
+            sync,
+            offsets: Vec::new(),
+            test: None,
+            work_size,
+            masks: None,
+            points: true,
+            rehearse: false,
+        }
     }
 }
 

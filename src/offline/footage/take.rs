@@ -4,11 +4,10 @@
 //! frames in the order of time, each frame with the moment that it belongs to. Cameras have no lens distortion:
 //! pictures are undistorted when they are loaded.
 
+use crate::offline::dataset::TrainingView;
 use crate::offline::dataset::selection::camera_numbers;
-use crate::offline::dataset::{DatasetError, TrainingView};
 use crate::view::{Camera, Lens};
 use glam::UVec2;
-use image::{Rgb, RgbImage};
 use std::path::Path;
 
 /// The frames of several cameras.
@@ -69,21 +68,6 @@ impl Take {
     pub(crate) fn frame(&self, camera: usize, moment: usize) -> Option<&Frame> {
         let frames = &self.cameras[camera].frames;
         frames.binary_search_by_key(&moment, |frame| frame.moment).ok().map(|at| &frames[at])
-    }
-}
-
-impl Frame {
-    /// Loads the picture: undistorted, over black, at the size of the camera.
-    ///
-    /// # Errors
-    /// Those of [`TrainingView::load_covered`].
-    pub(crate) fn picture(&self) -> Result<RgbImage, DatasetError> {
-        let covered = self.view.load_covered()?;
-        let mut picture = RgbImage::new(covered.size.x, covered.size.y);
-        for (pixel, &[red, green, blue, _]) in picture.pixels_mut().zip(&covered.texels) {
-            *pixel = Rgb([red, green, blue]);
-        }
-        Ok(picture)
     }
 }
 

@@ -10,6 +10,7 @@ use crate::offline::dataset::formats::video::VIDEOS;
 use crate::offline::dataset::{DatasetError, Split};
 use crate::offline::footage::sync::{Changes, MOST, Offset, SIDE, by_motion, by_sound};
 use crate::offline::footage::take::{Filmed, Frame, Take};
+use crate::offline::footage::working::WorkingPictures;
 use crate::offline::footage::{FootageError, FootageSettings, Synchronization};
 use crate::offline::work::{Progress, proceed};
 use image::RgbImage;
@@ -46,6 +47,7 @@ impl Clocks {
     pub(super) fn of(
         source: &Source,
         settings: &FootageSettings,
+        working: &WorkingPictures,
         progress: &mut dyn Progress,
     ) -> Result<Self, FootageError> {
         let mut clocks = match settings.sync {
@@ -53,13 +55,13 @@ impl Clocks {
             Synchronization::No => Self::right(source, "not compared"),
             Synchronization::Auto => Self::heard(source, &settings.folder, progress)?,
             Synchronization::Motion => {
-                let (found, seconds) = moved(source, |_| true, progress)?;
+                let (found, seconds) = moved((source, working), |_| true, progress)?;
                 let offsets = found.iter().map(|offset| offset.map(|offset| in_seconds(offset, seconds))).collect();
                 return Ok(Self::compared(source, "by the motion in the pictures", offsets, progress));
             }
         };
         let trained = |camera| is_trained(source, camera);
-        let (found, _) = moved(&timed(source.clone(), &clocks.offsets), trained, progress)?;
+        let (found, _) = moved((&timed(source.clone(), &clocks.offsets), working), trained, progress)?;
         clocks.left = found.into_iter().map(|offset| offset.map(|offset| offset.seconds)).collect();
         Ok(clocks)
     }
@@ -135,7 +137,7 @@ fn is_trained(source: &Source, camera: usize) -> bool {
 /// Compares the clocks of some cameras by the motion in their pictures. Returns by how many frames each is too late,
 /// and the seconds of a frame.
 fn moved(
-    source: &Source,
+    (source, working): (&Source, &WorkingPictures),
     is_compared: impl Fn(usize) -> bool,
     progress: &mut dyn Progress,
 ) -> Result<(Vec<Option<Offset>>, f64), FootageError> {
@@ -151,7 +153,7 @@ fn moved(
     let mut changes = Vec::new();
     progress.begin("motion", long.len());
     for (_, camera) in &long {
-        changes.push(changes_of(camera, progress)?);
+        changes.push(changes_of(camera, working, progress)?);
         progress.advance();
     }
     progress.finish();
@@ -162,12 +164,14 @@ fn moved(
 }
 
 /// Returns what changes in the pictures of a camera.
-fn changes_of(camera: &Filmed, progress: &dyn Progress) -> Result<Changes, FootageError> {
+fn changes_of(camera: &Filmed, working: &WorkingPictures, progress: &dyn Progress) -> Result<Changes, FootageError> {
     let mut pictures = Vec::new();
     let frames = &camera.frames[..camera.frames.len().min(MOST)];
     for some in frames.chunks(AT_ONCE) {
         proceed(progress)?;
-        let load = |frame: &Frame| -> Result<(f32, RgbImage), DatasetError> { Ok((frame.view.time, frame.picture()?)) };
+        let load = |frame: &Frame| -> Result<(f32, RgbImage), DatasetError> {
+            Ok((frame.view.time, working.picture(&frame.view)?))
+        };
         pictures.extend(some.par_iter().map(load).collect::<Vec<_>>());
     }
     Ok(Changes::of(camera.camera, pictures.into_iter())?)

@@ -9,6 +9,7 @@ use crate::offline::footage::FootageError;
 use crate::offline::footage::colmap::{ColmapError, Program, triangulated};
 use crate::offline::footage::points::{Masked, Plate, TakePoints, moving_points, standing_points, write};
 use crate::offline::footage::take::{Filmed, Take};
+use crate::offline::footage::working::WorkingPictures;
 use crate::offline::store::results::Key;
 use crate::offline::work::{FileError, Progress};
 use crate::scene::Origin;
@@ -47,22 +48,32 @@ impl Cloud {
     /// A picture or a file that cannot be read, a folder that cannot be written to, an interruption.
     pub(super) fn write(
         seen: (&Take, &Names<'_>),
+        working: &WorkingPictures,
         known: Option<&(PathBuf, Origin)>,
         out: &Path,
         progress: &mut dyn Progress,
     ) -> Result<Self, FootageError> {
         let (take, path) = (seen.0, out.join(FILE));
-        let standing = standing(take, known, out, progress)?;
-        let TakePoints { points } = TakePoints::joined(moving(seen, out, progress)?, standing);
+        let standing = standing((take, working), known, out, progress)?;
+        let TakePoints { points } = TakePoints::joined(moving(seen, working, out, progress)?, standing);
         if points.is_empty() {
-            return match fs::remove_file(&path) {
-                Err(error) if error.kind() != ErrorKind::NotFound => Err(FileError::at(&path, error).into()),
-                _ => Ok(Self { points: 0, hash: None }),
-            };
+            return Self::none(out);
         }
         let middle = take.moments.first().zip(take.moments.last()).map_or(0.0, |(first, last)| first.midpoint(*last));
         write(&path, &points, &Origin::default(), middle)?;
         Ok(Self { points: points.len(), hash: Some(Key::of_file(&path)?.bytes().to_vec()) })
+    }
+
+    /// Removes the file of an earlier run, if there is one.
+    ///
+    /// # Errors
+    /// A file that cannot be removed.
+    pub(super) fn none(out: &Path) -> Result<Self, FootageError> {
+        let path = out.join(FILE);
+        match fs::remove_file(&path) {
+            Err(error) if error.kind() != ErrorKind::NotFound => Err(FileError::at(&path, error).into()),
+            _ => Ok(Self { points: 0, hash: None }),
+        }
     }
 
     /// Returns whether the file is in the folder of the dataset, if there is to be one.
@@ -80,6 +91,7 @@ impl Cloud {
 /// Returns the points of what moves.
 fn moving(
     (take, names): (&Take, &Names<'_>),
+    working: &WorkingPictures,
     out: &Path,
     progress: &mut dyn Progress,
 ) -> Result<Vec<CloudPoint>, FootageError> {
@@ -87,7 +99,7 @@ fn moving(
     let masked = |camera: usize, moment: usize| -> Result<Option<Masked>, FootageError> {
         let Some(frame) = take.frame(camera, moment) else { return Ok(None) };
         let Some(mask) = read_mask(out, &take.cameras[camera], frame, names)? else { return Ok(None) };
-        Ok(Some(Masked { camera, picture: frame.picture()?, mask }))
+        Ok(Some(Masked { camera, picture: working.picture(&frame.view)?, mask }))
     };
     let mut load = |moment: usize| -> Result<Vec<Masked>, FootageError> {
         (0..take.cameras.len()).into_par_iter().filter_map(|camera| masked(camera, moment).transpose()).collect()
@@ -98,7 +110,7 @@ fn moving(
 /// Returns the points of what stands still: those that the plates show, else those that are known, else those that the
 /// first pictures of the cameras show. If cameras are too far apart for that, by matches.
 fn standing(
-    take: &Take,
+    (take, working): (&Take, &WorkingPictures),
     known: Option<&(PathBuf, Origin)>,
     out: &Path,
     progress: &mut dyn Progress,
@@ -119,7 +131,7 @@ fn standing(
         let cameras: Vec<&Filmed> = take.cameras.iter().step_by(step).collect();
         let first = |camera: &&Filmed| -> Result<Option<Plate>, FootageError> {
             let Some(frame) = camera.frames.first() else { return Ok(None) };
-            let picture = frame.picture()?;
+            let picture = working.picture(&frame.view)?;
             let confidence = GrayImage::from_pixel(picture.width(), picture.height(), Luma([u8::MAX]));
             Ok(Some(Plate { camera: camera.camera, picture, confidence }))
         };

@@ -10,6 +10,7 @@ use super::source::Source;
 use crate::offline::footage::FootageError;
 use crate::offline::footage::take::Take;
 use crate::offline::footage::verdict::{CameraSync, Evidence, Synchrony, verdict};
+use crate::offline::footage::working::WorkingPictures;
 use crate::offline::work::{FileError, Progress, write_beside};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -38,6 +39,7 @@ impl Judged {
     /// A folder that cannot be written to, an interruption.
     pub(super) fn write(
         (take, names): (&Take, &Names<'_>),
+        working: &WorkingPictures,
         (source, clocks): (&Source, &Clocks),
         rehearsed: Option<Rehearsed>,
         out: &Path,
@@ -48,7 +50,7 @@ impl Judged {
             let frame = take.frame(camera, moment)?;
             read_mask(out, &take.cameras[camera], frame, names).ok().flatten()
         };
-        let mut evidence = Evidence::of(take, mask, progress)?;
+        let mut evidence = Evidence::of((take, working), mask, progress)?;
         evidence.synchrony = synchrony(take, source, clocks);
         evidence.rehearsal = rehearsed.map(Rehearsed::evidence);
         let verdict = verdict(&evidence);

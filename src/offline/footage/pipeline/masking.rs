@@ -10,6 +10,7 @@ use crate::offline::dataset::TrainingView;
 use crate::offline::footage::FootageError;
 use crate::offline::footage::plates::{masks, plate};
 use crate::offline::footage::take::{Filmed, Frame, Take};
+use crate::offline::footage::working::WorkingPictures;
 use crate::offline::work::{FileError, Progress, proceed};
 use image::{GrayImage, ImageError, RgbImage};
 use rayon::prelude::*;
@@ -107,6 +108,7 @@ impl Given {
 /// A picture that cannot be read or written, an interruption.
 pub(super) fn write_masks(
     (take, names): (&Take, &Names<'_>),
+    working: &WorkingPictures,
     given: Option<&Given>,
     out: &Path,
     progress: &mut dyn Progress,
@@ -120,7 +122,7 @@ pub(super) fn write_masks(
         let step = camera.frames.len().div_ceil(AT_ONCE);
         let read = |frames: &[&Frame]| -> Result<(Vec<RgbImage>, Vec<Option<GrayImage>>), FootageError> {
             let mask = |frame: &&Frame| given.map_or(Ok(None), |given| given.mask(camera, frame, names));
-            Ok((load(frames)?, frames.par_iter().map(mask).collect::<Result<_, _>>()?))
+            Ok((load(frames, working)?, frames.par_iter().map(mask).collect::<Result<_, _>>()?))
         };
         let (mut pictures, mut known) = read(&camera.frames.iter().step_by(step).collect::<Vec<_>>())?;
         let plate = plate(&pictures, &known);
@@ -187,8 +189,8 @@ fn file_name(frame: &Frame, names: &Names<'_>) -> String {
 }
 
 /// Loads pictures.
-fn load(frames: &[&Frame]) -> Result<Vec<RgbImage>, FootageError> {
-    Ok(frames.par_iter().map(|frame| frame.picture()).collect::<Result<_, _>>()?)
+fn load(frames: &[&Frame], working: &WorkingPictures) -> Result<Vec<RgbImage>, FootageError> {
+    Ok(frames.par_iter().map(|frame| working.picture(&frame.view)).collect::<Result<_, _>>()?)
 }
 
 /// Returns a given mask with the lens and the size of its frame: white or black.

@@ -2,7 +2,8 @@
 //!
 //! In: [`FootageSettings`]. Out: a folder with pictures, cameras, times, plates, masks, points and a verdict
 //! ([`MadeDataset`]). [`footage`] is the list of stages. Their results are in the folder of the dataset and, as lists
-//! and figures, in `DATASET.footage` beside it, so that an interrupted run resumes, and a later one does nothing.
+//! and figures, in `DATASET.footage` beside it, so that an interrupted run resumes, and a later one does nothing. The
+//! pictures that stages work with are there too, until the run is complete.
 //!
 //! | file | subject |
 //! |---|---|
@@ -35,13 +36,17 @@ mod written;
 pub use made::MadeDataset;
 pub(crate) use plain::{is_raw, uncalibrated};
 
-use super::take::Take;
+use super::sync::SIDE;
+use super::take::{Take, reduced};
+use super::verdict::LONGEST;
+use super::working::WorkingPictures;
 use super::{FootageError, FootageSettings};
-use crate::offline::dataset::{Dataset, Split};
+use crate::offline::dataset::{Dataset, Split, TrainingView};
 use crate::offline::store::results::{BAKE_FOLDER, Key, Store, folder_beside};
 use crate::offline::store::stages::Stages;
 use crate::offline::store::stored::Text;
 use crate::offline::work::Progress;
+use crate::view::Camera;
 use clocks::Clocks;
 use cloud::Cloud;
 use judged::Judged;
@@ -55,6 +60,8 @@ use written::Written;
 
 /// The ending of the folder of results, after the name of the dataset.
 const FOLDER: &str = ".footage";
+/// The folder of the pictures to work with, in that of results.
+const PICTURES: &str = "pictures";
 /// Number of stages: poses, sync, plates, points, dataset, rehearsal, verdict.
 const STAGES: usize = 7;
 /// The name of the dataset that is made before a bake or a training, in its folder of results.
@@ -87,7 +94,7 @@ pub fn footage(settings: &FootageSettings, progress: &mut dyn Progress) -> Resul
         Some(test) => source.tested_by(test)?,
         None => source,
     };
-    let made = run(settings, source, &mut stages)?;
+    let made = run(settings, source, &store, &mut stages)?;
     stages.finish();
     Ok(made)
 }
@@ -115,19 +122,29 @@ fn find_cameras(settings: &FootageSettings, stages: &mut Stages<'_>) -> Result<F
 }
 
 /// Runs the stages after the cameras are known.
-fn run(settings: &FootageSettings, source: Source, stages: &mut Stages<'_>) -> Result<MadeDataset, FootageError> {
+fn run(
+    settings: &FootageSettings,
+    source: Source,
+    store: &Store,
+    stages: &mut Stages<'_>,
+) -> Result<MadeDataset, FootageError> {
     let out = &settings.out;
     let pictures = pictures_key(&source, stages.progress())?;
-    let (clocks, clocks_key) = compare_clocks(settings, &source, pictures, stages)?;
+    let working = working_pictures(settings, &source, pictures, store);
+    let (clocks, clocks_key) = compare_clocks(settings, (&source, &working), pictures, stages)?;
     let source = timed(source, &clocks.offsets);
     let (take, names) = source.take(settings.work_size);
     let seen = (&take, &names);
 
-    let (masked, masks_key) = separate(settings, seen, pictures, stages)?;
+    let (masked, masks_key) = separate(settings, (seen, &working), pictures, stages)?;
     let seen_key = masks_key.with(Key::of_views(&source.views()));
     let is_there = |Text(cloud): &Text<Cloud>| cloud.is_in(out);
-    let find = |progress: &mut dyn Progress| Cloud::write(seen, source.points.as_ref(), out, progress).map(Text);
-    let (Text(cloud), cloud_key) = stages.run("points", seen_key, is_there, find)?;
+    let find = |progress: &mut dyn Progress| match settings.points {
+        true => Cloud::write(seen, &working, source.points.as_ref(), out, progress).map(Text),
+        false => Cloud::none(out).map(Text),
+    };
+    let key = seen_key.and(&format!("{}", settings.points));
+    let (Text(cloud), cloud_key) = stages.run("points", key, is_there, find)?;
 
     let key = seen_key.with(cloud_key).and(&format!("{:?}", source.clock));
     let is_there = |Text(written): &Text<Written>| written.is_in(out);
@@ -137,9 +154,11 @@ fn run(settings: &FootageSettings, source: Source, stages: &mut Stages<'_>) -> R
 
     let key = seen_key.with(clocks_key).with(rehearsal_key);
     let is_there = |Text(judged): &Text<Judged>| judged.is_in(out);
-    let judge =
-        |progress: &mut dyn Progress| Judged::write(seen, (&source, &clocks), rehearsed, out, progress).map(Text);
+    let judge = |progress: &mut dyn Progress| {
+        Judged::write(seen, &working, (&source, &clocks), rehearsed, out, progress).map(Text)
+    };
     let (Text(judged), _) = stages.run("verdict", key, is_there, judge)?;
+    working.remove()?;
 
     let frames = source.shots.iter().filter(|shot| shot.split == Split::Train).count();
     Ok(MadeDataset {
@@ -170,6 +189,19 @@ fn pictures_key(source: &Source, progress: &mut dyn Progress) -> Result<Key, Foo
     Ok(all.and(&format!("{:?}", source.cameras)))
 }
 
+/// Returns the pictures to work with of the cameras to train on, if they are larger than that: at the work size, and at
+/// the sizes at which the verdict and the comparison of motion look at them. `pictures` is the key of the pictures.
+fn working_pictures(settings: &FootageSettings, source: &Source, pictures: Key, store: &Store) -> WorkingPictures {
+    let sizes = |camera: &Camera| {
+        let work = reduced(camera, settings.work_size);
+        [work, reduced(&work, LONGEST), reduced(camera, SIDE)].map(|camera| camera.size)
+    };
+    let is_large = |view: &TrainingView| view.original.max_element() > settings.work_size;
+    let trained = source.shots.iter().filter(|shot| shot.split == Split::Train).map(|shot| &shot.view);
+    let wanted = trained.filter(|view| is_large(view)).map(|view| (view, sizes(&view.camera)));
+    WorkingPictures::new(store.folder().join(PICTURES), pictures, wanted)
+}
+
 /// Returns the key of the version of this crate.
 fn version() -> Key {
     Key::of(env!("CARGO_PKG_VERSION").as_bytes())
@@ -178,7 +210,7 @@ fn version() -> Key {
 /// Runs the stage sync. `pictures` is the key of the pictures.
 fn compare_clocks(
     settings: &FootageSettings,
-    source: &Source,
+    (source, working): (&Source, &WorkingPictures),
     pictures: Key,
     stages: &mut Stages<'_>,
 ) -> Result<(Clocks, Key), FootageError> {
@@ -186,7 +218,7 @@ fn compare_clocks(
     let videos: Vec<&Path> = videos.iter().flatten().map(PathBuf::as_path).collect();
     let key = pictures.with(Key::of_views(&source.views())).with(Key::of_files(&videos)?);
     let key = key.and(&format!("{:?} {:?}", settings.sync, settings.offsets));
-    let compare = |progress: &mut dyn Progress| Clocks::of(source, settings, progress).map(Text);
+    let compare = |progress: &mut dyn Progress| Clocks::of(source, settings, working, progress).map(Text);
     let (Text(clocks), key) = stages.run("sync", key, |_| true, compare)?;
     Ok((clocks, key))
 }
@@ -195,7 +227,7 @@ fn compare_clocks(
 /// key of all that plates and masks depend on: their list has sizes alone.
 fn separate(
     settings: &FootageSettings,
-    seen: (&Take, &Names<'_>),
+    (seen, working): ((&Take, &Names<'_>), &WorkingPictures),
     pictures: Key,
     stages: &mut Stages<'_>,
 ) -> Result<(Masked, Key), FootageError> {
@@ -207,7 +239,8 @@ fn separate(
     let paths: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
     let key = pictures.with(Key::of_files(&paths)?).and(&format!("{} {paths:?}", settings.work_size));
     let is_there = |Text(masked): &Text<Masked>| masked.is_in(out);
-    let write = |progress: &mut dyn Progress| masking::write_masks(seen, given.as_ref(), out, progress).map(Text);
+    let write =
+        |progress: &mut dyn Progress| masking::write_masks(seen, working, given.as_ref(), out, progress).map(Text);
     let (Text(masked), _) = stages.run("plates", key, is_there, write)?;
     Ok((masked, key))
 }
@@ -235,7 +268,6 @@ fn rehearse(
 mod tests {
     use super::*;
     use crate::offline::work::NoProgress;
-    use crate::view::Camera;
     use glam::{DMat4, DVec4, UVec2, Vec3};
     use image::{Rgb, RgbImage};
     use serde_json::json;
@@ -308,7 +340,11 @@ mod tests {
             let is_whole = |name: &String| name != missing && !name.starts_with(".gs4d-");
             assert!(names().iter().all(is_whole), "at the task {task}: {:?}", names());
         }
+        let working = folder.path().join("out.footage/pictures");
+        let stored = fs::read_dir(&working).expect("the pictures to work with are kept for the next run").count();
+        assert_eq!(stored, 10, "those of the cameras to train on, at the work size");
         let made = footage(&settings, &mut NoProgress).expect("nobody interrupts");
+        assert!(!working.exists(), "nobody needs them any more");
         assert_eq!((made.frames, made.test_frames, made.moments), (10, 5, 5), "two cameras to train on");
         let skipped: Vec<bool> = made.stages.iter().map(|stage| stage.skipped).collect();
         assert_eq!(skipped, [true, true, true, false, false], "the stages that were done are not done again");

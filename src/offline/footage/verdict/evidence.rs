@@ -1,13 +1,14 @@
 //! What the checks of footage look at.
 //!
-//! In: a take, masks of what moves. Out: [`Evidence`]: the cameras with the moments of their frames, small pictures of
-//! moments that are spread evenly, how sharp each camera is at full size, and pictures that cannot be read. The caller
-//! adds how well the cameras are synchronized, and what a short training has reached.
+//! In: a take with its pictures, masks of what moves. Out: [`Evidence`]: the cameras with the moments of their frames,
+//! small pictures of moments that are spread evenly, how sharp each camera is at full size, and pictures that cannot be
+//! read. The caller adds how well the cameras are synchronized, and what a short training has reached.
 
 use super::plane::Plane;
 use super::sharpness::Sharpness;
 use crate::offline::dataset::{DatasetError, TrainingView};
 use crate::offline::footage::take::{Filmed, Frame, Take, reduced};
+use crate::offline::footage::working::WorkingPictures;
 use crate::offline::work::{Interrupted, Progress, proceed};
 use crate::view::Camera;
 use glam::UVec2;
@@ -17,7 +18,7 @@ use rayon::prelude::*;
 use std::collections::HashSet;
 
 /// Longer side of the small pictures, pixels.
-pub(super) const LONGEST: u32 = 320;
+pub(crate) const LONGEST: u32 = 320;
 /// Small pictures of all cameras, and the least and most of a camera.
 const PICTURES: usize = 400;
 const FEWEST: usize = 8;
@@ -100,7 +101,7 @@ impl Evidence {
     /// # Errors
     /// [`Interrupted`]. Pictures that cannot be read are evidence.
     pub(crate) fn of(
-        take: &Take,
+        (take, pictures): (&Take, &WorkingPictures),
         masks: impl Fn(usize, usize) -> Option<GrayImage> + Sync,
         progress: &mut dyn Progress,
     ) -> Result<Self, Interrupted> {
@@ -110,7 +111,7 @@ impl Evidence {
         let mut cameras = Vec::with_capacity(take.cameras.len());
         for (index, filmed) in take.cameras.iter().enumerate() {
             proceed(progress)?;
-            cameras.push(Seen::of(filmed, &chosen, |moment| masks(index, moment)));
+            cameras.push(Seen::of((filmed, pictures), &chosen, |moment| masks(index, moment)));
             progress.advance();
         }
         progress.finish();
@@ -125,10 +126,14 @@ impl Evidence {
 
 impl Seen {
     /// Reads the pictures of these moments.
-    fn of(filmed: &Filmed, chosen: &HashSet<usize>, masks: impl Fn(usize) -> Option<GrayImage> + Sync) -> Self {
+    fn of(
+        (filmed, pictures): (&Filmed, &WorkingPictures),
+        chosen: &HashSet<usize>,
+        masks: impl Fn(usize) -> Option<GrayImage> + Sync,
+    ) -> Self {
         let frames: Vec<&Frame> = filmed.frames.iter().filter(|frame| chosen.contains(&frame.moment)).collect();
         let read: Vec<Result<Sample, DatasetError>> =
-            frames.into_par_iter().map(|frame| Sample::of(frame, masks(frame.moment))).collect();
+            frames.into_par_iter().map(|frame| Sample::of(frame, masks(frame.moment), pictures)).collect();
         let (mut samples, mut failures, mut first) = (Vec::new(), 0, None);
         for result in read {
             match result {
@@ -143,7 +148,7 @@ impl Seen {
         let middle = shown.get(shown.len() / 2);
         let middle = middle.and_then(|moment| filmed.frames.iter().find(|frame| frame.moment == *moment));
         let sharpness = middle.and_then(|frame| {
-            let picture = loaded(frame, full(&frame.view)).ok()?;
+            let picture = loaded(frame, full(&frame.view), pictures).ok()?;
             Some(Sharpness::of(&Plane::luminance(&picture), masks(frame.moment).as_ref()))
         });
         Self {
@@ -164,8 +169,8 @@ impl Seen {
 
 impl Sample {
     /// Reads the small picture of a frame.
-    fn of(frame: &Frame, mask: Option<GrayImage>) -> Result<Self, DatasetError> {
-        let color = loaded(frame, reduced(&frame.view.camera, LONGEST))?;
+    fn of(frame: &Frame, mask: Option<GrayImage>, pictures: &WorkingPictures) -> Result<Self, DatasetError> {
+        let color = loaded(frame, reduced(&frame.view.camera, LONGEST), pictures)?;
         Ok(Self::new(frame.moment, color, mask))
     }
 
@@ -185,9 +190,8 @@ impl Sample {
 }
 
 /// Returns the picture of a frame at the size of a camera, whole: not multiplied by the mask of the view.
-fn loaded(frame: &Frame, camera: Camera) -> Result<RgbImage, DatasetError> {
-    let view = TrainingView { camera, mask: None, ..frame.view.clone() };
-    Frame { moment: frame.moment, view }.picture()
+fn loaded(frame: &Frame, camera: Camera, pictures: &WorkingPictures) -> Result<RgbImage, DatasetError> {
+    pictures.picture(&TrainingView { camera, mask: None, ..frame.view.clone() })
 }
 
 /// Returns the camera of a view at the size of its original picture, but not larger than 2048 pixels. Only the size is

@@ -30,7 +30,7 @@ mod silhouettes;
 mod sync;
 mod zoom;
 
-pub(crate) use evidence::{CameraSync, Evidence, Rehearsal, Synchrony};
+pub(crate) use evidence::{CameraSync, Evidence, LONGEST, Rehearsal, Synchrony};
 pub(crate) use finding::{Finding, Severity};
 
 use finding::Subject;
