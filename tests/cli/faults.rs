@@ -343,6 +343,7 @@ fn end(child: &mut Child, asking: bool) {
 }
 
 #[test]
+#[ignore = "takes minutes; `.ci/full` runs it by name"]
 fn killed_verbs_leave_their_outputs_old_or_complete() {
     let (stage, mut random) = (Stage::new(), Random::new(11));
     for act in stage.acts() {
@@ -432,6 +433,7 @@ fn a_full_disk_is_named_and_the_old_output_stays() {
 }
 
 #[test]
+#[ignore = "takes minutes; `.ci/full` runs it by name"]
 fn a_full_file_system_is_named_and_the_old_output_stays() {
     let stage = Stage::new();
     let probe = own_mounts().args(["mount", "-t", "tmpfs", "none"]).arg(stage.folder.path()).output();
@@ -484,6 +486,7 @@ fn closed_pipes_do_not_affect_the_output() {
 }
 
 #[test]
+#[ignore = "takes minutes; `.ci/full` runs it by name"]
 fn two_runs_at_once_leave_one_complete_output() {
     let stage = Stage::new();
     for act in stage.acts() {

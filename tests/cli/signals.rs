@@ -164,6 +164,7 @@ fn check(out: &Path, document: Option<&Value>, context: &str) {
 }
 
 #[test]
+#[ignore = "takes minutes; `.ci/full` runs it by name"]
 fn random_signals_end_work_on_the_gpu_without_a_crash() {
     if !has_gpu() {
         return;

@@ -146,7 +146,7 @@ fn a_ball_that_the_scene_lacks_is_found_with_births() {
 }
 
 #[test]
-#[ignore = "takes minutes on a software driver"]
+#[ignore = "takes minutes; `.ci/full` runs it by name"]
 fn training_with_births_repeats_and_resumes_at_the_same_bytes() {
     let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new();
