@@ -99,7 +99,7 @@
 //! |---|---|---|
 //! | [`view`] | cameras, times, appearance, pictures | |
 //! | [`gaussian`] | one native 4D Gaussian: slice, projection, color, the rules of overlap and alpha | |
-//! | [`scene`] | a capture in memory: its forms, bounds, filter, origin; picking | |
+//! | [`scene`] | a capture in memory: its forms, bounds, filter, origin; picking, edits | |
 //! | [`codec`] | files | |
 //! | [`mod@reference`] | the renderer's passes on the CPU, as plain functions over slices | |
 //! | [`renderer`] | wgpu: buffers, pipelines, one frame of a view | `renderer` |
@@ -137,6 +137,7 @@
 //! | [`CaptureState`](asset::CaptureState), [`Playback`](playback::Playback), [`CaptureSettings`](render::CaptureSettings) | captures; `Playback` also timelines | the plugins, unless the game does |
 //! | [`Upright`] | captures | the game; it requires [`UprightTurn`] |
 //! | [`Markers`](playback::Markers), [`FollowsClock`](playback::FollowsClock) | captures; `FollowsClock` also timelines | the game |
+//! | [`CaptureSocket`](playback::CaptureSocket), [`SocketState`](playback::SocketState) | children of captures | the game; the first requires the second |
 //! | [`PlaybackClock`](playback::PlaybackClock) | an entity of its own; timelines | the game; the plugins on timelines |
 //! | [`TimelinePlayer`](playback::TimelinePlayer) | a timeline in the world | the game |
 //! | [`TimelineTrack`](playback::TimelineTrack), [`ClipFade`](playback::ClipFade) | children of timelines | the plugins, or the game |
@@ -152,6 +153,7 @@
 //! | [`PlaybackSystems::Clocks`](playback::PlaybackSystems::Clocks) | `Update` | advance clocks |
 //! | [`PlaybackSystems::Timelines`](playback::PlaybackSystems::Timelines) | `Update`, after `Clocks` | advance timelines, set up their tracks |
 //! | [`PlaybackSystems::Advance`](playback::PlaybackSystems::Advance) | `Update`, after `Timelines` | advance captures; send the messages about playing |
+//! | [`PlaybackSystems::Sockets`](playback::PlaybackSystems::Sockets) | `PostUpdate`, after Bevy's `AnimationSystems`, before `TransformSystems::Propagate` | move entities with sockets |
 //! | Bevy's `VisibilitySystems::CalculateBounds` | `PostUpdate` | update the `Aabb` of captures |
 //! | [`CaptureSystems`](render::CaptureSystems) | `Core3d`, in the render world | draw captures into the target of a camera |
 //!

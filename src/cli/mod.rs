@@ -28,8 +28,8 @@ use std::ffi::OsString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
 use verbs::{
-    ablate, bake, bench, compare, compress, convert, detail, eval, export, fine_tune, fleet, footage, info, join, mask,
-    prune, render, score, split, synth, train,
+    ablate, bake, bench, compare, compress, convert, detail, edit, eval, export, fine_tune, fleet, footage, info, join,
+    mask, prune, render, score, socket, split, synth, train,
 };
 
 /// The exit code after a panic, a defect of this crate.
@@ -65,8 +65,10 @@ enum Verb {
     Render(render::Render),
     Compress(compress::Compress),
     Detail(detail::Detail),
+    Edit(edit::EditVerb),
     Join(join::Join),
     Split(split::SplitVerb),
+    Socket(socket::SocketVerb),
     Compare(compare::Compare),
     Synth(synth::Synth),
     Bench(bench::Bench),
@@ -93,8 +95,10 @@ impl Verb {
             Self::Render(verb) => verb.run(),
             Self::Compress(verb) => verb.run(),
             Self::Detail(verb) => verb.run(),
+            Self::Edit(verb) => verb.run(),
             Self::Join(verb) => verb.run(),
             Self::Split(verb) => verb.run(),
+            Self::Socket(verb) => verb.run(),
             Self::Compare(verb) => verb.run(),
             Self::Synth(verb) => verb.run(),
             Self::Bench(verb) => verb.run(),

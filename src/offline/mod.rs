@@ -22,6 +22,8 @@
 //! | [`segments`] | captures of stretches of time become one, and one becomes chunks |
 //! | [`mod@compress`] | the Gaussians are packed, and their colors are coded by codebooks |
 //! | [`mod@train`] | the Gaussians are trained: from pictures alone, or to compensate for removed Gaussians |
+//! | [`edit`] | a list of edits is read, and cameras tell floaters from what stands there |
+//! | [`sockets`] | named points follow the Gaussians around them |
 //! | [`mod@footage`] | footage of several cameras becomes a dataset, with a verdict |
 //! | [`mod@detail`] | levels of fewer Gaussians are made, for pictures of few pixels |
 //! | [`report`] | the result of a bake, or of many, becomes a page |
@@ -33,6 +35,7 @@ pub mod compress;
 pub mod dataset;
 pub mod detail;
 pub mod draw;
+pub mod edit;
 pub mod engine;
 pub mod filter;
 pub mod footage;
@@ -43,6 +46,7 @@ pub mod prune;
 pub mod report;
 pub mod score;
 pub mod segments;
+pub mod sockets;
 pub mod store;
 pub mod train;
 pub mod work;

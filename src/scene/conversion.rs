@@ -8,9 +8,25 @@ use super::gaussian_scene::GaussianScene;
 use super::runtime_scene::{Level, RuntimeScene};
 use super::sliced::Sliced;
 use crate::gaussian::{Gaussian, InvalidGaussian, SliceSettings};
+use std::borrow::Cow;
 use std::sync::Arc;
 
 impl GaussianScene {
+    /// Returns the Gaussians in the runtime form, without their color.
+    ///
+    /// # Errors
+    /// The first Gaussian that cannot be drawn, of a scene in the trained form.
+    pub(crate) fn gaussians(&self) -> Result<Cow<'_, [Gaussian]>, InvalidGaussian> {
+        match &self.form {
+            SceneForm::Trained(Trained { parameters, .. }) => {
+                let prefilter_var = self.trained_with.prefilter_var;
+                Ok(Cow::Owned(parameters.slice(&SliceSettings { prefilter_var, ..SliceSettings::default() })?))
+            }
+            SceneForm::Ready(Form::Sliced(sliced)) => Ok(Cow::Borrowed(&sliced.gaussians)),
+            SceneForm::Ready(packed @ Form::Packed(_)) => Ok(Cow::Owned(packed.iter().collect())),
+        }
+    }
+
     /// Converts the scene for drawing: slices the Gaussians if they are in the trained form. Colors are moved, not
     /// copied.
     ///
@@ -127,11 +143,11 @@ impl Conversion {
     /// As [`advance`](Self::advance).
     pub(crate) fn finish(mut self) -> Result<RuntimeScene, InvalidGaussian> {
         while self.advance(usize::MAX)? {}
-        let GaussianScene { form, environment, filter, trained_with, playback, .. } = self.scene;
+        let GaussianScene { form, environment, filter, trained_with, playback, sockets, .. } = self.scene;
         let form = match form {
             SceneForm::Trained(Trained { harmonics, .. }) => Form::Sliced(Sliced { gaussians: self.sliced, harmonics }),
             SceneForm::Ready(form) => form,
         };
-        Ok(RuntimeScene { form, environment, filter, trained_with, playback, levels: self.before })
+        Ok(RuntimeScene { form, environment, filter, trained_with, playback, levels: self.before, sockets })
     }
 }

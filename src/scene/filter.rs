@@ -134,7 +134,7 @@ impl TemporalFilter {
     ///
     /// # Panics
     /// If `index` is out of range.
-    pub(super) fn window(&self, index: usize, interval: [f32; 2]) -> [f64; 2] {
+    pub(crate) fn window(&self, index: usize, interval: [f32; 2]) -> [f64; 2] {
         let (FilterKind::Window, ActiveSets::Intervals(words)) = (self.kind, &self.sets) else {
             return [f64::NEG_INFINITY, f64::INFINITY];
         };

@@ -7,6 +7,7 @@ use super::filter::TemporalFilter;
 use super::form::{Form, SceneForm};
 use super::provenance::{PlaybackHints, TrainedWith};
 use super::runtime_scene::{Level, RuntimeScene, check_around, check_levels};
+use super::socket::{Socket, check_sockets};
 use crate::gaussian::Model;
 
 /// A capture in memory.
@@ -24,6 +25,8 @@ pub struct GaussianScene {
     pub playback: PlaybackHints,
     /// Levels of detail, which have fewer Gaussians, finest first; usually none.
     pub levels: Vec<Level>,
+    /// Named points that follow a part of the capture; usually none. Levels of detail have none.
+    pub sockets: Vec<Socket>,
 }
 
 impl GaussianScene {
@@ -59,6 +62,7 @@ impl GaussianScene {
     pub fn check(&self) -> Result<(), &'static str> {
         self.form.check_parts()?;
         check_around(self.len(), self.filter.as_ref(), self.environment.as_ref())?;
+        check_sockets(&self.sockets)?;
         check_levels(&self.levels, &self.trained_with, self.environment.is_some())
     }
 }
@@ -72,6 +76,7 @@ impl From<RuntimeScene> for GaussianScene {
             trained_with: scene.trained_with,
             playback: scene.playback,
             levels: scene.levels,
+            sockets: scene.sockets,
         }
     }
 }

@@ -58,5 +58,6 @@ pub fn grow(
         trained_with: scene.trained_with.clone(),
         playback: scene.playback,
         levels: Vec::new(),
+        sockets: scene.sockets.clone(),
     })
 }

@@ -7,6 +7,7 @@
 mod bounds;
 mod conversion;
 pub(crate) mod detail;
+pub mod edit;
 mod environment;
 pub(crate) mod filter;
 mod form;
@@ -20,7 +21,9 @@ pub(crate) mod pieces;
 mod provenance;
 pub(crate) mod random;
 mod runtime_scene;
+mod select;
 mod sliced;
+mod socket;
 pub mod synth;
 
 pub use bounds::{Bounds, BoundsOverTime};
@@ -36,3 +39,5 @@ pub use pick::{Pick, PickSettings};
 pub use provenance::{Origin, PlaybackHints, RotationConvention, TrainedCameras, TrainedWith, UpAxis};
 pub use runtime_scene::{Level, RuntimeScene};
 pub use sliced::Sliced;
+pub(crate) use socket::check_sockets;
+pub use socket::{Socket, SocketSample};

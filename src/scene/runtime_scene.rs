@@ -9,6 +9,7 @@ use super::filter::TemporalFilter;
 use super::form::Form;
 use super::provenance::{PlaybackHints, TrainedWith};
 use super::sliced::Sliced;
+use super::socket::{Socket, check_sockets};
 use crate::gaussian::{Gaussian, Harmonics};
 use crate::view::{Background, Optics};
 use glam::Vec3;
@@ -29,9 +30,11 @@ pub struct RuntimeScene {
     pub playback: PlaybackHints,
     /// Levels of detail, which have fewer Gaussians, finest first; usually none.
     pub levels: Vec<Level>,
+    /// Named points that follow a part of the capture; usually none. Levels of detail have none.
+    pub sockets: Vec<Socket>,
 }
 
-/// A level of detail: a capture of fewer Gaussians, without levels, environment map and temporal filter.
+/// A level of detail: a capture of fewer Gaussians, without levels, environment map, temporal filter and sockets.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Level {
     /// The largest size on the screen (`pixels_across`) at which it looks nearly the same as all Gaussians, pixels.
@@ -51,6 +54,7 @@ impl RuntimeScene {
             trained_with: TrainedWith::default(),
             playback: PlaybackHints::default(),
             levels: Vec::new(),
+            sockets: Vec::new(),
         }
     }
 
@@ -95,6 +99,7 @@ impl RuntimeScene {
     pub fn check(&self) -> Result<(), &'static str> {
         self.form.check_parts()?;
         check_around(self.len(), self.filter.as_ref(), self.environment.as_ref())?;
+        check_sockets(&self.sockets)?;
         check_levels(&self.levels, &self.trained_with, self.environment.is_some())
     }
 
@@ -157,8 +162,8 @@ pub(super) fn check_levels(
     check_sizes(levels.iter().map(|level| level.pixels))?;
     for level in levels {
         let own = &level.scene;
-        if !own.levels.is_empty() || own.environment.is_some() || own.filter.is_some() {
-            return Err("a level of detail that has levels, an environment map or a temporal filter itself");
+        if !own.levels.is_empty() || own.environment.is_some() || own.filter.is_some() || !own.sockets.is_empty() {
+            return Err("a level of detail that has levels, an environment map, a temporal filter or sockets itself");
         }
         if level.scene.trained_with.time_interval != trained_with.time_interval {
             return Err("a level of detail of another time interval");

@@ -73,6 +73,7 @@ pub fn synthesize(settings: &SynthSettings) -> GaussianScene {
         trained_with: TrainedWith { raster_fov: RasterFov::Corrected, ..TrainedWith::default() },
         playback: PlaybackHints { duration_seconds: settings.duration_seconds, ..PlaybackHints::default() },
         levels: Vec::new(),
+        sockets: Vec::new(),
     }
 }
 

@@ -33,6 +33,7 @@ mod replaced_file;
 mod scenes;
 mod shade;
 mod shadows;
+mod sockets;
 mod steady;
 mod stereo;
 mod testing;

@@ -10,6 +10,7 @@ mod compare;
 mod compress;
 mod dataset;
 mod detail;
+mod edit;
 mod eval;
 mod export;
 // Faults need `/dev/full` and the limits of a shell, which Linux has.
@@ -36,6 +37,7 @@ mod signals;
 // The limit of the address space is set by a shell and read from `/proc`.
 #[cfg(target_os = "linux")]
 mod sizes;
+mod socket;
 mod train;
 
 #[path = "../support"]

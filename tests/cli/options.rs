@@ -235,13 +235,24 @@ const REFUSED: &[(&str, &str)] = &[
     ("detail a -o o --resolution 2", "the following required arguments were not provided"),
     ("detail a -o o --static", "the following required arguments were not provided"),
     ("detail a -o o --trust-images", "the following required arguments were not provided"),
+    ("edit a b -o o --size 8x8", "the following required arguments were not provided"),
+    ("edit a b -o o --resolution 2", "the following required arguments were not provided"),
+    ("edit a b -o o --static", "the following required arguments were not provided"),
+    ("edit a b --dry-run --level 3", "the argument '--"),
+    ("edit a b --dry-run --out o", "the argument '--"),
     (
         "join chunk-00001-of-00001.gs4d -o o --keep-times",
         "--keep-times has no effect on the chunks of one capture; leave it out",
     ),
+    ("socket a --list --name n", "the argument '--list' cannot be used with '--name <NAME>'"),
+    ("socket a --list --out o", "the argument '--list' cannot be used with '--out <OUT>'"),
+    ("socket a --name n --remove --out o --at 0,0,0", "the argument '--remove' cannot be used with '--at <X,Y,Z>'"),
+    ("socket a --name n --remove --out o --time 0", "the argument '--remove' cannot be used with '--time <T>'"),
+    ("socket a --name n --remove --out o --rate 9", "the argument '--remove' cannot be used with '--rate <HZ>'"),
     ("synth o --sh-degree 2 --sh-degree-t 1", "--sh-degree-t has no effect with --sh-degree below 3"),
     ("convert a o --sh-degree 2 --sh-degree-t 1", "--sh-degree-t has no effect with --sh-degree below 3"),
     ("footage a -o o --sync no --offset b=1", "the argument '--"),
+    ("footage a -o o --rehearse --no-points", "the argument '--"),
     ("synth o --grow 2 a --count 3", "the argument '--grow <K> <CAPTURE>' cannot be used with '--count <N>'"),
     (
         "synth o --grow 2 a --duration 3",
@@ -286,6 +297,7 @@ const READERS: &[(&str, &str)] = &[
     ("render", "--out OUT --orbit 1 --adapter none-such"),
     ("compress", "-o OUT.gs4d"),
     ("detail", "-o OUT.gs4d"),
+    ("edit", "EDITS.ron -o OUT.gs4d"),
     ("bench", ""),
     ("score", "--data DATA --out OUT.f32 --variant energy"),
     ("prune", "--data DATA --keep 3 -o OUT.gs4d"),
@@ -336,6 +348,7 @@ const REFUSED_ON_FILES: &[(&str, &str)] = &[
     ("bench SCENE.gs4d --filter off", "--filter has no effect on a capture without a temporal filter"),
     ("bench SCENE.gs4d --form fp32", "--form has no effect on a capture that is not packed"),
     ("compare A.png B.png --size 8x8", "--size has no effect without .f32 pictures"),
+    ("edit SCENE.gs4d EDITS.ron -o OUT.gs4d --data DATA", "--data has no effect on a list of edits without"),
     (
         "finetune SCENE.gs4d --data DATA -o OUT.gs4d --refresh-filter 3",
         "--refresh-filter has no effect on a scene without a temporal filter of the kind key-frame or interval",
@@ -485,9 +498,24 @@ const ALWAYS: &[(&str, &[&str])] = &[
             "--up",
         ],
     ),
+    (
+        "edit",
+        &[
+            "--background",
+            "--cutoff",
+            "--dry-run",
+            "--duration",
+            "--raster-fov",
+            "--sh-direction",
+            "--time-interval",
+            "--trained-cameras",
+            "--up",
+        ],
+    ),
     ("compare", &[]),
     ("join", &["--level", "--out"]),
     ("split", &["--chunk", "--level", "--out"]),
+    ("socket", &["--list", "--remove"]),
     ("synth", &["--grow", "--level", "--out", "--seed", "--sh-degree"]),
     (
         "bench",
@@ -739,6 +767,7 @@ fn files() -> TempDir {
     trained.environment = Some(Environment { width: 4, height: 2, texels: vec![0.5; 24] });
     let settings = WriteSettings::default();
     offline::work::save(&path("surrounded.gs4d"), &trained, &settings).expect("the folder can be written to");
+    fs::write(path("edits.ron"), "[]").expect("the folder can be written to");
     for picture in ["a.png", "b.png"] {
         image::RgbImage::new(8, 8).save(path(picture)).expect("the folder can be written to");
     }

@@ -41,6 +41,7 @@ fn no_verb_writes_over_an_input() {
         arguments!["prune", scene, "--data", data, "--ratio", "0.5", "-o", scene].to_vec(),
         arguments!["prune", scene, "--scores", &scores, "--keep", "9", "-o", &scores].to_vec(),
         arguments!["mask", scene, "-o", scene].to_vec(),
+        arguments!["socket", scene, "--name", "a", "--at", "0,0,0", "--time", "0", "-o", scene].to_vec(),
         arguments!["mask", scene, "--filter", "interval", "--data", data, "-o", &image].to_vec(),
         arguments!["score", scene, "--data", data, "--out", scene].to_vec(),
         arguments!["score", scene, "--data", data, "--out", &trained_on].to_vec(),

@@ -148,7 +148,8 @@ impl Case {
         };
         let form = SceneForm::Trained(trained.clone());
         let playback = PlaybackHints::default();
-        let scene = GaussianScene { form, environment: None, filter: None, trained_with, playback, levels: Vec::new() };
+        let (levels, sockets) = Default::default();
+        let scene = GaussianScene { form, environment: None, filter: None, trained_with, playback, levels, sockets };
         scene.into_runtime_with(&self.slice).expect("valid Gaussians")
     }
 

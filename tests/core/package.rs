@@ -8,8 +8,8 @@ use crate::support::package_parts::Parts;
 use bevy_gs4d::codec::package::{self, MAGIC, PackageError, PackageInfo, VERSION, WriteSettings};
 use bevy_gs4d::gaussian::{Gaussian, Harmonics, Model, Parameters};
 use bevy_gs4d::scene::{
-    Environment, Form, GaussianScene, Level, PlaybackHints, RuntimeScene, SceneForm, Sliced, Trained, TrainedCameras,
-    TrainedWith, UpAxis,
+    Environment, Form, GaussianScene, Level, PlaybackHints, RuntimeScene, SceneForm, Sliced, Socket, SocketSample,
+    Trained, TrainedCameras, TrainedWith, UpAxis,
 };
 use bytemuck::{Zeroable, cast_slice};
 use proptest::prelude::*;
@@ -102,6 +102,7 @@ fn scene(shape: &Shape, seed: u64) -> GaussianScene {
         },
         playback: PlaybackHints { up: UpAxis::NegY, duration_seconds: 1.0 / 3.0 },
         levels: Vec::new(),
+        sockets: Vec::new(),
     }
 }
 
@@ -607,8 +608,8 @@ fn detailed() -> GaussianScene {
         let shape = Shape { model: None, count, ..SMALL };
         let scene = scene(&shape, 30 + count as u64);
         let SceneForm::Ready(form) = scene.form else { panic!("the runtime form") };
-        let GaussianScene { environment, filter, trained_with, playback, .. } = scene;
-        let scene = RuntimeScene { form, environment, filter, trained_with, playback, levels: Vec::new() };
+        let GaussianScene { environment, filter, trained_with, playback, levels, sockets, .. } = scene;
+        let scene = RuntimeScene { form, environment, filter, trained_with, playback, levels, sockets };
         Level { pixels, scene: Arc::new(scene) }
     };
     GaussianScene { levels: vec![level(64.0, 2), level(8.0, 1)], ..scene(&SMALL, 31) }
@@ -692,5 +693,66 @@ fn damaged_levels_are_refused() {
     ];
     for (from, to) in headers {
         assert!(read(&good.clone().swap(from, to).seal()).is_err(), "{from} as {to}");
+    }
+}
+
+/// Returns a scene with two sockets, whose values have many decimals.
+fn with_sockets() -> GaussianScene {
+    let sample = |time: f32| SocketSample {
+        time,
+        position: [-0.0, 0.1 * time, f32::MIN_POSITIVE],
+        rotation: [0.6, 0.0, 0.0, -0.8],
+        error: time / 3.0,
+    };
+    let socket = |name: &str, times: &[f32]| Socket {
+        name: name.to_owned(),
+        samples: times.iter().map(|&time| sample(time)).collect(),
+    };
+    GaussianScene {
+        sockets: vec![socket("hand", &[0.25, 0.5, 2.7]), socket("\"left\" foot", &[1.0])],
+        ..scene(&SMALL, 33)
+    }
+}
+
+#[test]
+fn sockets_are_read_without_loss() {
+    let scene = with_sockets();
+    let file = pack(&scene);
+    let again = read(&file).expect("readable");
+    assert_same(&scene, &again);
+    assert_eq!(again.sockets, scene.sockets, "all sockets");
+    let zero = again.sockets[0].samples[0].position[0];
+    assert!(zero == 0.0 && zero.is_sign_negative(), "the sign of a zero");
+    assert!(file == pack(&again), "writing them again gives the same file");
+    let info = inspect(&file).expect("readable");
+    assert!(info.header.requires.is_empty(), "readers without sockets can read the scene");
+    let without = read(&Parts::of(&file).swap("    sockets: [", "    later: [").seal()).expect("readable");
+    assert!(without.sockets.is_empty(), "an older reader skips them");
+    assert_same(&scene, &without);
+    let plain = GaussianScene { sockets: Vec::new(), ..scene };
+    assert!(!Parts::of(&pack(&plain)).header.contains("sockets"), "a package without sockets is as before");
+}
+
+#[test]
+fn bad_sockets_are_neither_read_nor_written() {
+    let good = Parts::of(&pack(&with_sockets()));
+    for (from, to) in [
+        ("name: \"hand\"", "name: \"\""),
+        ("time: 0.25", "time: 0.5"),
+        ("time: 0.25", "time: inf"),
+        ("rotation: (0.6", "rotation: (6.0"),
+    ] {
+        let error = read(&good.clone().swap(from, to).seal()).expect_err("must be refused");
+        assert!(matches!(error, PackageError::Inconsistent(_)), "{from} as {to}: {error}");
+    }
+    let mut twice = with_sockets();
+    twice.sockets.extend(with_sockets().sockets);
+    let sockets = with_sockets().sockets;
+    let mut nested = detailed();
+    let level = RuntimeScene { sockets, ..nested.levels[1].scene.as_ref().clone() };
+    nested.levels[1].scene = Arc::new(level);
+    for bad in [twice, nested] {
+        let error = package::write(Vec::new(), &bad, &WriteSettings::default()).expect_err("must be refused");
+        assert!(matches!(error, PackageError::Inconsistent(_)), "{error}");
     }
 }

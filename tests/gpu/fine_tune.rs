@@ -73,6 +73,7 @@ fn gradients_match_the_original() {
             trained_with: golden.scene.trained_with.clone(),
             playback: golden.scene.playback,
             levels: Vec::new(),
+            sockets: Vec::new(),
         };
         let weights = |key: &str| golden::floats(&folder.join(expected[key].as_str().expect("a file")));
         let (color, depth, alpha) = (weights("w_color"), weights("w_depth"), weights("w_alpha"));

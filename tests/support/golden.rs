@@ -102,6 +102,7 @@ fn load_view(folder: &Path, scene_name: &str, json: &Value, view: &Value) -> Gol
         trained_with,
         playback: PlaybackHints::default(),
         levels: Vec::new(),
+        sockets: Vec::new(),
     }
     .into_runtime_with(&settings)
     .expect("golden scenes are valid");

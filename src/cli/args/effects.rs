@@ -37,6 +37,8 @@ pub(crate) enum Need {
     Motion,
     /// No environment map.
     OpenBackground,
+    /// An edit that asks what the training cameras see.
+    Cameras,
     // Of the result.
     /// A result that is played, or has a duration.
     Playback,
@@ -208,6 +210,11 @@ pub(crate) const RULES: &[Rule] = &[
         need: Need::OpenBackground,
         options: &["--behind"],
         reason: "on a capture with an environment map, which is behind all images",
+    },
+    Rule {
+        need: Need::Cameras,
+        options: &["--data", "--size", "--resolution", "--static"],
+        reason: "on a list of edits without remove_floaters, which alone asks what cameras see",
     },
     Rule {
         need: Need::Playback,

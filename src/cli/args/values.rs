@@ -20,6 +20,11 @@ pub(crate) fn color(text: &str) -> Result<[f32; 3], String> {
     numbers(text).ok_or_else(|| "expected three numbers, such as 0,0.5,1".to_owned())
 }
 
+/// Parses `X,Y,Z`.
+pub(crate) fn point(text: &str) -> Result<[f32; 3], String> {
+    numbers(text).ok_or_else(|| "expected three numbers, such as 0.5,-1,0".to_owned())
+}
+
 /// Parses `T0,T1` with T0 before T1, in double precision: seconds since 1970 lose their fractions in single precision.
 pub(crate) fn interval(text: &str) -> Result<[f64; 2], String> {
     let time = |text: &str| text.trim().parse::<f64>().ok().filter(|time| time.is_finite());

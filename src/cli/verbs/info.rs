@@ -15,7 +15,7 @@ use crate::gaussian::Model;
 use crate::offline::dataset::{CameraOptions, Dataset};
 use crate::offline::forms::convert::form_name;
 use crate::scene::packed::MAX_STAGES;
-use crate::scene::{Bounds, ColorDegrees, GaussianScene, Level, PlaybackHints, SceneForm, TrainedWith};
+use crate::scene::{Bounds, ColorDegrees, GaussianScene, Level, PlaybackHints, SceneForm, Socket, TrainedWith};
 use glam::Vec3;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -62,6 +62,7 @@ struct Facts {
     trained_with: TrainedWith,
     playback: PlaybackHints,
     levels: Vec<LevelFacts>,
+    sockets: Vec<SocketFacts>,
 }
 
 /// A level of detail, without its Gaussians.
@@ -71,6 +72,15 @@ struct LevelFacts {
     pixels: f32,
     /// Number of Gaussians; `None` if the package is damaged.
     gaussians: Option<usize>,
+}
+
+/// A socket, without its samples.
+#[derive(Serialize)]
+struct SocketFacts {
+    name: String,
+    /// The first and the last time of its track, timestamp units.
+    from: f32,
+    to: f32,
 }
 
 /// Bounds of the Gaussians, capture units.
@@ -150,6 +160,7 @@ impl Info {
             "environment": facts.environment,
             "switches": switches_json(&facts.trained_with, &facts.playback),
             "levels": facts.levels,
+            "sockets": facts.sockets,
             "bounds": extent.as_ref().map(|extent| box_json(&extent.all)),
             "core": extent.as_ref().map(|extent| box_json(&extent.core)),
             "package": package.map(package_json),
@@ -175,6 +186,7 @@ impl Facts {
             trained_with: scene.trained_with.clone(),
             playback: scene.playback,
             levels: scene.levels.iter().map(LevelFacts::of_level).collect(),
+            sockets: scene.sockets.iter().map(SocketFacts::of_socket).collect(),
         }
     }
 
@@ -200,6 +212,7 @@ impl Facts {
                 .iter()
                 .map(|&StoredLevel { pixels }| LevelFacts { pixels, gaussians: None })
                 .collect(),
+            sockets: header.sockets.iter().map(SocketFacts::of_socket).collect(),
         }
     }
 
@@ -226,6 +239,10 @@ impl Facts {
             let levels: Vec<String> = self.levels.iter().map(LevelFacts::to_string).collect();
             pairs.push(("levels of detail", levels.join(", ")));
         }
+        if !self.sockets.is_empty() {
+            let sockets = self.sockets.iter().map(|SocketFacts { name, from, to }| format!("{name} ({from} to {to})"));
+            pairs.push(("sockets", sockets.collect::<Vec<_>>().join(", ")));
+        }
         pairs
     }
 }
@@ -233,6 +250,13 @@ impl Facts {
 impl LevelFacts {
     fn of_level(level: &Level) -> Self {
         Self { pixels: level.pixels, gaussians: Some(level.scene.len()) }
+    }
+}
+
+impl SocketFacts {
+    fn of_socket(socket: &Socket) -> Self {
+        let [from, to] = socket.reach().unwrap_or_default();
+        Self { name: socket.name.clone(), from, to }
     }
 }
 

@@ -66,6 +66,9 @@ impl Join {
             let size = self.save(&scene)?;
             return Ok(self.report(&scene, before, size, &[(path, None, scene.len())], true));
         }
+        if segments.iter().any(|segment| !segment.scene.sockets.is_empty()) {
+            note("note: sockets are left out: the track of each ends with its segment; gs4d socket makes new ones");
+        }
         let times = if self.keep_times { Times::Own } else { Times::Following };
         let Joined { scene, segments, is_exact } = join(segments, times, &mut Bars::default())?;
         if !is_exact {

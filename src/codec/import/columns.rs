@@ -96,6 +96,7 @@ impl Played {
                 duration_seconds: options.duration_seconds.unwrap_or(self.duration_seconds),
             },
             levels: Vec::new(),
+            sockets: Vec::new(),
         };
         scene.check().map_err(ImportError::damaged)?;
         Ok(scene)

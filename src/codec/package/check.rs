@@ -11,7 +11,7 @@ use crate::gaussian::SMALLEST_CUTOFF;
 use crate::gaussian::harmonics::{MAX_COEFFICIENTS, evaluated};
 use crate::scene::detail::check_sizes;
 use crate::scene::packed::MAX_ENTRIES;
-use crate::scene::{GaussianScene, MAX_LEVELS, MAX_SEGMENTS, SceneForm, Trained};
+use crate::scene::{GaussianScene, MAX_LEVELS, MAX_SEGMENTS, SceneForm, Trained, check_sockets};
 
 /// Uncompressed bytes that a package of any length may hold.
 const RAW_FLOOR: u64 = 64 << 20;
@@ -128,6 +128,7 @@ impl Header {
         )?;
         sane(self.levels.len() <= MAX_LEVELS, "more levels of detail than a capture may have")?;
         check_sizes(self.levels.iter().map(|level| level.pixels)).map_err(PackageError::Inconsistent)?;
+        check_sockets(&self.sockets).map_err(PackageError::Inconsistent)?;
         let duration = self.playback.duration_seconds;
         sane(duration.is_finite() && duration >= 0.0, "the playback duration must be a finite number, zero or above")
     }

@@ -10,7 +10,7 @@ use crate::gaussian::{Gaussian, MARGINAL_CUTOFF, Model};
 use crate::scene::packed::{COLOR_WORDS, MAX_STAGES, RECORD_WORDS};
 use crate::scene::{
     ActiveSets, ColorDegrees, FilterKind, Form, GaussianScene, PackedColors, PackedScene, PlaybackHints, SceneForm,
-    TemporalFilter, Trained, TrainedWith,
+    Socket, TemporalFilter, Trained, TrainedWith,
 };
 use crate::view::NEAR;
 use serde::{Deserialize, Serialize};
@@ -47,6 +47,9 @@ pub struct Header {
     /// The levels of detail, finest first. Each is a section `level` of its own.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub levels: Vec<StoredLevel>,
+    /// Named points that follow a part of the capture. Levels of detail have none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sockets: Vec<Socket>,
     /// The section table, in the order of the file.
     pub sections: Vec<Section>,
 }
@@ -166,6 +169,7 @@ impl Header {
             trained_with: scene.trained_with.clone(),
             playback: scene.playback,
             levels: scene.levels.iter().map(|level| StoredLevel { pixels: level.pixels }).collect(),
+            sockets: scene.sockets.clone(),
             sections: Vec::new(),
         }
     }

@@ -50,6 +50,7 @@ pub(super) fn empty(header: &Header) -> GaussianScene {
         trained_with: header.trained_with.clone(),
         playback: header.playback,
         levels: Vec::new(),
+        sockets: header.sockets.clone(),
     }
 }
 

@@ -226,8 +226,8 @@ impl Sections {
         let SceneForm::Ready(form) = self.scene.form else {
             return Err(PackageError::Inconsistent("a level of detail in the trained form"));
         };
-        let GaussianScene { environment, filter, trained_with, playback, .. } = self.scene;
-        Ok(RuntimeScene { form, environment, filter, trained_with, playback, levels: Vec::new() })
+        let GaussianScene { environment, filter, trained_with, playback, sockets, .. } = self.scene;
+        Ok(RuntimeScene { form, environment, filter, trained_with, playback, levels: Vec::new(), sockets })
     }
 }
 

@@ -148,6 +148,7 @@ impl Maker<'_> {
             },
             playback: self.full.playback,
             levels: Vec::new(),
+            sockets: Vec::new(),
         }
     }
 

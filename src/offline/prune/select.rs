@@ -3,8 +3,7 @@
 //! In: a scene of any form and a score for each Gaussian. Out: the scene with some of the Gaussians, in their original
 //! order, with their color and their part of the temporal filter.
 
-use crate::gaussian::Parameters;
-use crate::scene::{Form, GaussianScene, SceneForm, Sliced, Trained};
+use crate::scene::{Form, GaussianScene, SceneForm};
 
 /// Returns how many of `count` Gaussians remain when this fraction (0 to 1) is removed: `round((1 − ratio) count)`.
 pub fn kept_count(count: usize, ratio: f64) -> usize {
@@ -27,40 +26,8 @@ pub fn highest(scores: &[f32], count: usize) -> Vec<u32> {
 /// # Panics
 /// If an index is not below the length of the scene.
 pub fn select(scene: &GaussianScene, keep: &[u32]) -> GaussianScene {
-    let form = match &scene.form {
-        SceneForm::Trained(Trained { parameters, harmonics }) => SceneForm::Trained(Trained {
-            parameters: select_parameters(parameters, keep),
-            harmonics: harmonics.select(keep),
-        }),
-        SceneForm::Ready(Form::Sliced(Sliced { gaussians, harmonics })) => SceneForm::Ready(Form::Sliced(Sliced {
-            gaussians: rows(gaussians, keep),
-            harmonics: harmonics.select(keep),
-        })),
-        SceneForm::Ready(Form::Packed(_)) => return select(&scene.clone().unpacked(), keep),
-    };
-    GaussianScene {
-        form,
-        environment: scene.environment.clone(),
-        filter: scene.filter.as_ref().map(|filter| filter.select(keep)),
-        trained_with: scene.trained_with.clone(),
-        playback: scene.playback,
-        levels: Vec::new(),
+    match &scene.form {
+        SceneForm::Trained(_) | SceneForm::Ready(Form::Sliced(_)) => scene.select(keep),
+        SceneForm::Ready(Form::Packed(_)) => scene.clone().unpacked().select(keep),
     }
-}
-
-fn select_parameters(parameters: &Parameters, keep: &[u32]) -> Parameters {
-    Parameters {
-        mean: rows(&parameters.mean, keep),
-        mean_t: rows(&parameters.mean_t, keep),
-        log_scale: rows(&parameters.log_scale, keep),
-        log_scale_t: rows(&parameters.log_scale_t, keep),
-        rotation_l: rows(&parameters.rotation_l, keep),
-        rotation_r: rows(&parameters.rotation_r, keep),
-        opacity_logit: rows(&parameters.opacity_logit, keep),
-    }
-}
-
-/// Returns these rows of an attribute; an attribute that the model does not have stays empty.
-fn rows<T: Copy>(values: &[T], keep: &[u32]) -> Vec<T> {
-    if values.is_empty() { Vec::new() } else { keep.iter().map(|&index| values[index as usize]).collect() }
 }

@@ -53,7 +53,8 @@ pub struct Joined {
 /// Joins segments. Begins the task "joining".
 ///
 /// The capture is in the trained form if all segments are, with one model and one speed; else in the runtime form.
-/// Segments must be in one space; their origins are used.
+/// Segments must be in one space; their origins are used. Sockets are left out: the track of each ends with its
+/// segment.
 ///
 /// # Errors
 /// Segments that are packed, are stills, are drawn with different settings or overlap; a Gaussian that cannot be drawn.
@@ -81,7 +82,8 @@ pub fn join(mut segments: Vec<Segment>, times: Times, progress: &mut dyn Progres
         count,
         sets: ActiveSets::Intervals(intervals),
     };
-    let scene = GaussianScene { form, environment, filter: Some(filter), trained_with, playback, levels: Vec::new() };
+    let (filter, (levels, sockets)) = (Some(filter), Default::default());
+    let scene = GaussianScene { form, environment, filter, trained_with, playback, levels, sockets };
     Ok(Joined { scene, segments, is_exact: grid.is_exact })
 }
 

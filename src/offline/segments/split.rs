@@ -70,8 +70,11 @@ impl Split {
         for (run, path) in self.runs.iter().zip(self.paths(folder)) {
             proceed(progress)?;
             let mut scene = select(&segment.scene, &run.gaussians);
-            // All chunks have one, in the first file.
+            // All chunks have one environment map, and the same sockets, in the first file.
             scene.environment = scene.environment.filter(|_| chunks.is_empty());
+            if !chunks.is_empty() {
+                scene.sockets.clear();
+            }
             save(&path, &scene, &write_settings(&scene.form, level))?;
             chunks.push(Chunk { path, times: self.times(segment, run), gaussians: run.gaussians.len() });
             progress.advance();

@@ -214,6 +214,7 @@ fn outline(scene: &RuntimeScene) -> RuntimeScene {
         trained_with: scene.trained_with.clone(),
         playback: scene.playback,
         levels: scene.levels.iter().map(level).collect(),
+        sockets: scene.sockets.clone(),
         ..RuntimeScene::sliced(Vec::new(), Harmonics::default())
     }
 }

@@ -16,7 +16,7 @@
 //! ```
 //!
 //! A playback can follow a clock or another player ([`FollowsClock`]). [`Markers`] are named times of one capture, like
-//! the markers of a timeline.
+//! the markers of a timeline. A [`CaptureSocket`] follows a named point of a capture.
 //!
 //! Bevy's own animations may animate any field of a [`Playback`] but `repeat` through
 //! `animated_field!(Playback::speed)`. They run in `PostUpdate`: a `time` set on a capture is drawn in the same frame;
@@ -30,6 +30,7 @@ mod markers;
 mod messages;
 mod plugin;
 mod repeat;
+mod socket;
 mod span;
 mod state;
 mod stepping;
@@ -45,6 +46,7 @@ pub use messages::{
 pub use plugin::CapturePlaybackPlugin;
 pub(crate) use plugin::require_playback;
 pub use repeat::Repeat;
+pub use socket::{CaptureSocket, SocketState};
 pub use systems::PlaybackSystems;
 pub use timeline::{
     Clip, ClipFade, InvalidTimeline, Timeline, TimelineError, TimelineLoader, TimelinePlayer, TimelineTrack, Track,

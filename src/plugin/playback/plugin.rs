@@ -7,17 +7,19 @@ use super::component::Playback;
 use super::messages::{
     MarkerReached, PlaybackEnded, PlaybackLooped, PlaybackPaused, PlaybackSeeked, PlaybackStarted, SegmentBoundCrossed,
 };
+use super::socket::{CaptureSocket, place_sockets};
 use super::systems::{PlaybackSystems, advance_captures, run_clocks, warn_of_missing_handles};
 use super::timeline::{Timeline, TimelineLoader, TimelinePlayer, advance_timelines, bind_tracks, update_tracks};
 use crate::plugin::asset::{set_up, set_up_late};
 use crate::plugin::component::GaussianCapture3d;
-use bevy::app::{App, Last, Plugin, Update};
+use bevy::app::{AnimationSystems, App, Last, Plugin, PostUpdate, Update};
 use bevy::asset::AssetApp;
 use bevy::ecs::query::Changed;
 use bevy::ecs::schedule::IntoScheduleConfigs;
 use bevy::ecs::schedule::common_conditions::{any_match_filter, any_with_component};
 use bevy::log::warn;
 use bevy::time::Time;
+use bevy::transform::TransformSystems;
 
 /// Plays captures and timelines. Part of [`GaussianCapturePlugins`](crate::GaussianCapturePlugins). Without it,
 /// captures show the time that the game sets in their [`Playback`].
@@ -42,7 +44,7 @@ impl Plugin for CapturePlaybackPlugin {
 }
 
 fn add(app: &mut App) {
-    use PlaybackSystems::{Advance, Clocks, Timelines};
+    use PlaybackSystems::{Advance, Clocks, Sockets, Timelines};
     require_playback(app);
     app.init_asset::<Timeline>()
         .init_asset_loader::<TimelineLoader>()
@@ -54,6 +56,7 @@ fn add(app: &mut App) {
         .add_message::<PlaybackLooped>()
         .add_message::<PlaybackEnded>()
         .configure_sets(Update, (Clocks, Timelines, Advance).chain())
+        .configure_sets(PostUpdate, Sockets.after(AnimationSystems).before(TransformSystems::Propagate))
         .add_systems(
             Update,
             (
@@ -65,6 +68,7 @@ fn add(app: &mut App) {
                 advance_captures.in_set(Advance),
             ),
         )
+        .add_systems(PostUpdate, place_sockets.run_if(any_with_component::<CaptureSocket>).in_set(Sockets))
         // The game may still set a handle in the same frame.
         .add_systems(Last, warn_of_missing_handles.run_if(any_match_filter::<Changed<GaussianCapture3d>>));
 }

@@ -21,7 +21,7 @@ use bevy::ecs::system::{Query, Res};
 use bevy::log::{debug_span, warn};
 use bevy::time::Time;
 
-/// Sets of playback systems in `Update`, in this order.
+/// Sets of playback systems, in this order: all but the last in `Update`.
 #[derive(SystemSet, Debug, Clone, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum PlaybackSystems {
@@ -32,6 +32,9 @@ pub enum PlaybackSystems {
     /// Captures advance. Systems `.before` this set can change the speed; systems `.after` it read the time that will
     /// be drawn, and may still change it.
     Advance,
+    /// In `PostUpdate`, after Bevy's animations, which may change the time, and before transforms are propagated:
+    /// entities with a [`CaptureSocket`](super::CaptureSocket) get their transforms.
+    Sockets,
 }
 
 /// Advances the clocks with [`ClockSource::Game`](super::ClockSource::Game).

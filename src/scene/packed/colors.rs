@@ -97,6 +97,22 @@ impl CodedColors {
         lanes::unpack_code(self.records[index], stage)
     }
 
+    /// Returns the colors of the Gaussians at these indices, in this order, with the same codebooks.
+    ///
+    /// # Panics
+    /// If an index is out of range.
+    pub(super) fn select(&self, keep: &[u32]) -> Self {
+        let records = keep.iter().map(|&index| self.records[index as usize]).collect();
+        Self {
+            degree: self.degree,
+            degree_t: self.degree_t,
+            records,
+            entries: self.entries.clone(),
+            codebooks: self.codebooks.clone(),
+            scales: self.scales.clone(),
+        }
+    }
+
     /// Returns the sum of a Gaussian's entries in all codebooks, RGB innermost, padded to whole words. The codebooks
     /// written here have 0 in place of the DC coefficient; other values there are added to the DC coefficient.
     ///

@@ -149,6 +149,13 @@ pub(super) fn unpack(record: [u32; RECORD_WORDS]) -> [u16; LANES] {
     std::array::from_fn(|lane| (record[lane / 2] >> (16 * (lane % 2))) as u16)
 }
 
+/// Returns the record with opacity 0.
+pub(super) fn hidden(record: [u32; RECORD_WORDS]) -> [u32; RECORD_WORDS] {
+    let mut lanes = unpack(record);
+    lanes[OPACITY] = 0;
+    pack(lanes)
+}
+
 /// Returns the lane of a record with the index of the component of the rotation that is left out.
 pub(super) fn left_out(record: [u32; RECORD_WORDS]) -> u32 {
     record[LEFT_OUT / 2] >> (16 * (LEFT_OUT % 2)) & 0xffff

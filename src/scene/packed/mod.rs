@@ -13,6 +13,7 @@
 //! | `strays.rs` | Gaussians far from the others, which have blocks of their own |
 //! | `encode.rs`, `additional_bits.rs` | from Gaussians to records and ranges |
 //! | `decode.rs` | from records and ranges to Gaussians and colors |
+//! | `select.rs` | some of the Gaussians, without a change of their values |
 //! | `rounding.rs` | the change of a Gaussian by packing |
 //! | `coarseness.rs` | whether means are precise enough for the size of their Gaussians |
 //! | `shape.rs` | a covariance as scales and a rotation, and back |
@@ -30,6 +31,7 @@ pub(crate) mod order;
 pub(crate) mod pack;
 mod rounding;
 mod scene;
+mod select;
 mod shape;
 mod strays;
 

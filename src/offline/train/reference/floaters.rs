@@ -16,7 +16,7 @@ pub(crate) const HIDDEN: f32 = -8.0;
 /// Largest distance before a camera, as a share of the distance of what the cameras look at.
 const CLOSE: f32 = 0.15;
 /// Least size in a picture in which a Gaussian counts as seen: two standard deviations, pixels.
-const LARGE: f32 = 5.0;
+pub(crate) const LARGE: f32 = 5.0;
 /// Most cameras that see a floater.
 const FEW: usize = 2;
 

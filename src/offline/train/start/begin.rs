@@ -135,6 +135,7 @@ pub fn begin(
         trained_with,
         playback,
         levels: Vec::new(),
+        sockets: Vec::new(),
     };
     Ok((scene, start))
 }
