@@ -79,11 +79,10 @@ fn differing(a: &RgbaImage, b: &RgbaImage) -> f64 {
     differ as f64 / f64::from(a.width() * a.height())
 }
 
-/// Draws two times and checks the pictures.
-fn check(example: &str, options: &[&str], expected: usize) {
-    let Some(pictures) = pictures(Path::new(ROOT), example, options, 2) else { return };
+/// Checks the pictures of an example.
+fn check(example: &str, pictures: &[RgbaImage], expected: usize) {
     assert_eq!(pictures.len(), expected, "{example} writes the requested number of pictures");
-    for picture in &pictures {
+    for picture in pictures {
         let first = picture.get_pixel(0, 0);
         assert!(picture.pixels().any(|pixel| pixel != first), "the picture of {example} has more than one color");
     }
@@ -93,39 +92,20 @@ fn check(example: &str, options: &[&str], expected: usize) {
     }
 }
 
-#[test]
-fn minimal_writes_pictures() {
-    check("minimal", &[], 2);
-}
-
-#[test]
-fn play_writes_pictures() {
-    check("play", &[], 2);
-}
-
-#[test]
-fn scene_writes_pictures() {
-    check("scene", &[], 2);
-}
-
-#[test]
-fn timeline_writes_pictures() {
-    check("timeline", &[], 2);
-}
-
-#[test]
-fn walkthrough_writes_pictures() {
-    check("walkthrough", &[], 2);
+/// Draws two times and checks the pictures.
+fn draw(example: &str, options: &[&str], expected: usize) {
+    let Some(pictures) = pictures(Path::new(ROOT), example, options, 2) else { return };
+    check(example, &pictures, expected);
 }
 
 #[test]
 fn walkthrough_writes_pairs_of_pictures() {
-    check("walkthrough", &["--two-targets"], 4);
+    draw("walkthrough", &["--two-targets"], 4);
 }
 
 #[test]
 fn headless_writes_pictures() {
-    check("headless", &["--size", "200x120"], 2);
+    draw("headless", &["--size", "200x120"], 2);
 }
 
 /// Returns a folder with the assets of the crate, except that the captures are fully transparent. Their durations and
@@ -148,12 +128,13 @@ fn invisible() -> TempDir {
 }
 
 #[test]
-fn pictures_show_the_captures() {
+fn every_example_writes_pictures_that_show_its_captures_and_change() {
     let invisible = invisible();
     for example in EXAMPLES {
         let roots = [Path::new(ROOT), invisible.path()];
         // In the first picture the timeline's capture has not yet faded in.
         let [Some(seen), Some(unseen)] = roots.map(|root| pictures(root, example, &[], 4)) else { return };
+        check(example, &seen, 4);
         let fraction = differing(&seen[3], &unseen[3]);
         assert!(fraction > 0.01, "{example} shows its captures: without them {fraction} of the pixels differ");
         assert!(fraction < 0.9, "{example} also shows other objects: {fraction} of the pixels differ");

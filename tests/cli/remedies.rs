@@ -33,6 +33,11 @@ const REMEDIES: &[(&str, &str, &str)] = &[
         "bake SCENE.gs4d -o OUT.gs4d --data DATA --engine cpu --ratio 0.5 --variant energy",
     ),
     (
+        "edit SCENE.gs4d FLOATERS.ron -o OUT.gs4d",
+        "give --data DIR",
+        "edit SCENE.gs4d FLOATERS.ron -o OUT.gs4d --data DATA",
+    ),
+    (
         "score SCENE.gs4d --data FEW --out OUT.f32 --engine cpu",
         "or name a score with --variant",
         "score SCENE.gs4d --data FEW --out OUT.f32 --engine cpu --variant energy",
@@ -118,6 +123,8 @@ fn files() -> TempDir {
     gs4d(&arguments!["convert", &scene, path("runtime.gs4d"), "--form", "runtime"]).text();
     gs4d(&arguments!["compress", &scene, path("packed.gs4d"), "--codebooks", "4", "--verify", "0"]).text();
     fs::write(path("a.f32"), [0; 4 * 4 * 3 * 4]).expect("the folder can be written to");
+    let floaters = "[remove_floaters(cameras_below: 2, distance_below: 0.4)]";
+    fs::write(path("floaters.ron"), floaters).expect("the folder can be written to");
     folder
 }
 

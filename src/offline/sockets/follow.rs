@@ -6,6 +6,7 @@
 //! too: how far it ends from the start is reported.
 
 use super::error::SocketError;
+use super::look::Look;
 use super::motion::{Fit, Motion, fit};
 use super::neighbors::{Cloud, Near};
 use crate::offline::work::{Progress, proceed};
@@ -22,6 +23,10 @@ const REACH: [f64; 2] = [0.02, 0.1];
 const THINNER: f64 = 2.0;
 /// Largest estimate of the error, as a part of the size of the capture: beyond, the point is lost.
 const LARGEST_ERROR: f64 = 0.1;
+/// Smallest part of the colors at the start that are still around the point.
+const LEAST_SHARE: f64 = 0.3;
+/// Smallest distance within which colors are looked at, as a part of the size of the capture.
+const LOOK: f64 = 0.01;
 /// Smallest number of steps over the time interval.
 const STEPS: f64 = 256.0;
 
@@ -117,6 +122,8 @@ struct Follower<'a> {
     cloud: &'a Cloud,
     /// The distance within which neighbors are, capture units.
     reach: f64,
+    /// What the point looked like when it was placed.
+    look: Look,
 }
 
 /// A point on its way.
@@ -142,8 +149,12 @@ impl<'a> Follower<'a> {
     fn placed(cloud: &'a Cloud, start: &SocketSample) -> Result<Self, SocketError> {
         let [least, most] = REACH.map(|part| part * cloud.size);
         let (place, time) = (Vec3::from(start.position).as_dvec3(), f64::from(start.time));
-        let radius = cloud.near(place, time, most).radius;
-        let follower = Self { cloud, reach: (THINNER * radius).clamp(least, most) };
+        let Near { neighbors, radius } = cloud.near(place, time, most);
+        let sum: f64 = neighbors.iter().map(|neighbor| neighbor.weight).sum();
+        let squares = neighbors.iter().map(|neighbor| neighbor.weight * neighbor.at(time).distance_squared(place));
+        let around = (squares.sum::<f64>() / sum).sqrt().max(LOOK * cloud.size);
+        let look = Look::of(cloud.colors(place, time, around), around);
+        let follower = Self { cloud, reach: (THINNER * radius).clamp(least, most), look };
         match follower.motion(place, time, None) {
             Some(_) => Ok(follower),
             None => Err(SocketError::NothingThere { distance: most as f32, time: start.time }),
@@ -168,7 +179,7 @@ impl<'a> Follower<'a> {
         };
         for &time in times {
             proceed(progress)?;
-            let Some(next) = self.at(state, time.into()) else { break };
+            let Some(next) = self.at(state, time.into()).filter(|next| self.is_there(next)) else { break };
             state = next;
             samples.push(state.sample(time));
             progress.advance();
@@ -189,6 +200,12 @@ impl<'a> Follower<'a> {
         let back = self.track(end, &times, progress)?;
         let arrived = back.last().filter(|sample| sample.time == start.time);
         Ok(arrived.map(|sample| Vec3::from(sample.position).distance(start.position.into())))
+    }
+
+    /// Returns whether what the point was placed on is still around it.
+    fn is_there(&self, state: &State) -> bool {
+        let Self { cloud, look, .. } = self;
+        look.share(&cloud.colors(state.place, state.time, look.radius)) >= LEAST_SHARE
     }
 
     /// Returns the point at another time; `None` if it is lost before.
@@ -348,6 +365,29 @@ mod tests {
         assert_eq!((found.lost, found.returns), ([None; 2], [None, Some(0.0)]), "to the end of the interval and back");
         let at_rest = |sample: &SocketSample| (sample.position, sample.error) == ([0.0; 3], 0.0);
         assert!(found.socket.samples.iter().all(at_rest), "it does not move: {:?}", found.socket);
+    }
+
+    #[test]
+    fn a_part_that_jumps_between_gaussians_at_rest_is_lost_at_once() {
+        let mut random = Random::new(5);
+        let mut within = |size: f32| Vec3::from([(); 3].map(|()| random.in_range(-size, size)));
+        let mut gaussians: Vec<Gaussian> =
+            (0..900).map(|_| gaussian(within(1.0), 0.5, Vec3::splat(1e-3), f32::INFINITY)).collect();
+        let room = gaussians.len();
+        for moment in 0..20 {
+            let (time, place) = (moment as f32 / 19.0, Vec3::X * (0.2 * moment as f32 - 1.0));
+            let ball = (0..40).map(|_| gaussian(place + within(0.06), time, Vec3::splat(1e-3), 0.018));
+            gaussians.extend(ball);
+        }
+        let yellow = |index: usize| if index < room { [0.0; 3] } else { [1.5, 1.2, -1.0] };
+        let values: Vec<f32> = (0..gaussians.len()).flat_map(yellow).collect();
+        let harmonics = Harmonics { coefficients: 1, values, ..Harmonics::default() };
+        let jumps = GaussianScene::from(RuntimeScene::sliced(gaussians, harmonics));
+        let position = (Vec3::X * -1.0).to_array();
+        let placement = Placement { name: "ball".into(), position, time: 0.0, samples: 61 };
+        let found = followed(&jumps, &placement).expect("it is there");
+        let lost = found.lost[1].expect("the ball goes away, and its Gaussians do not move");
+        assert!(lost < 0.1, "lost before the second jump, and not after {lost}");
     }
 
     #[test]

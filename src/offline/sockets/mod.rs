@@ -7,10 +7,12 @@
 //! |---|---|
 //! | `neighbors` | the Gaussians that are drawn near a point at a time |
 //! | `motion` | the rigid motion that the velocities of neighbors agree on |
+//! | `look` | the colors around a point, which tell whether what it was placed on is still there |
 //! | `follow` | steps along these motions, over the whole time of a capture |
 
 mod error;
 mod follow;
+mod look;
 mod motion;
 mod neighbors;
 

@@ -36,6 +36,13 @@ pub(super) struct Neighbor {
     pub weight: f64,
 }
 
+impl Neighbor {
+    /// Returns its mean at a time, timestamp units.
+    pub(super) fn at(&self, time: f64) -> DVec3 {
+        self.mean + self.velocity * (time - self.mean_t)
+    }
+}
+
 /// A rigid motion near a point, whose velocity changes steadily in time.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Motion {

@@ -1,12 +1,13 @@
 //! The Gaussians that are drawn near a point at a time.
 //!
 //! In: the Gaussians of a capture, with its temporal filter; a point and a time. Out: the nearest [`Neighbor`]s,
-//! weighted by their opacity at that time and by their distance.
+//! weighted by their opacity at that time and by their distance; the colors around the point.
 
+use super::look::Colored;
 use super::motion::Neighbor;
-use crate::gaussian::{Gaussian, InvalidGaussian, lifespan_reach};
+use crate::gaussian::{Gaussian, Harmonics, InvalidGaussian, lifespan_reach};
 use crate::offline::forms::sliced;
-use crate::scene::{Bounds, GaussianScene, TrainedWith};
+use crate::scene::{Bounds, Form, GaussianScene, SceneForm, TrainedWith};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -14,6 +15,8 @@ use rayon::prelude::*;
 const COUNT: usize = 48;
 /// Smallest opacity at the time at which a Gaussian counts: fainter ones are haze or the remains of pruning.
 const FAINTEST: f32 = 0.02;
+/// The harmonic of degree 0.
+const BASE: f32 = 0.282_094_79;
 
 /// The Gaussians of a capture that can be followed.
 pub(super) struct Cloud {
@@ -29,6 +32,8 @@ pub(super) struct Cloud {
 /// A Gaussian, and the times between which it is drawn.
 struct Piece {
     gaussian: Gaussian,
+    /// Its color, independent of direction and time, 0 to 1.
+    color: Vec3,
     drawn: [f32; 2],
 }
 
@@ -47,7 +52,7 @@ impl Cloud {
     /// The first Gaussian that cannot be drawn.
     pub(super) fn of(scene: &GaussianScene) -> Result<Self, InvalidGaussian> {
         let TrainedWith { time_interval, marginal_cutoff, .. } = scene.trained_with;
-        let gaussians = sliced(scene)?;
+        let (gaussians, colors) = (sliced(scene)?, colors(scene));
         let reach = lifespan_reach(marginal_cutoff) as f32;
         let piece = |(index, gaussian): (usize, &Gaussian)| {
             let half = reach * gaussian.sigma_t;
@@ -57,7 +62,7 @@ impl Cloud {
             };
             let drawn = [first.max(gaussian.mean_t - half), last.min(gaussian.mean_t + half)];
             let is_followed = gaussian.opacity > FAINTEST && gaussian.check().is_ok();
-            is_followed.then_some(Piece { gaussian: *gaussian, drawn })
+            is_followed.then_some(Piece { gaussian: *gaussian, color: *colors.get(index)?, drawn })
         };
         let pieces: Vec<Piece> = gaussians.iter().enumerate().filter_map(piece).collect();
         let core = Bounds::core(pieces.iter().map(|piece| piece.gaussian));
@@ -106,5 +111,35 @@ impl Cloud {
             })
         });
         Near { neighbors: neighbors.collect(), radius }
+    }
+
+    /// Returns the colors of the Gaussians that are drawn at `time` (timestamp units) around a point in capture space,
+    /// weighted by their opacity at that time and by their distance, with a standard deviation of `radius` (capture
+    /// units).
+    pub(super) fn colors(&self, place: DVec3, time: f64, radius: f64) -> Vec<Colored> {
+        let (at, now, limit) = (place.as_vec3(), time as f32, (9.0 * radius * radius) as f32);
+        let colored = |piece: &Piece| {
+            let Piece { gaussian, color, drawn: [first, last] } = piece;
+            if !(*first..=*last).contains(&now) {
+                return None;
+            }
+            let distance = gaussian.mean_at(now).distance_squared(at);
+            let near = (-0.5 * f64::from(distance) / (radius * radius)).exp();
+            let weight = f64::from(gaussian.opacity * gaussian.marginal(now)) * near;
+            (distance <= limit).then_some(Colored { color: *color, weight })
+        };
+        self.pieces.par_iter().filter_map(colored).collect()
+    }
+}
+
+/// Returns the color of each Gaussian, independent of direction and time, 0 to 1.
+fn colors(scene: &GaussianScene) -> Vec<Vec3> {
+    let all = |harmonics: &Harmonics| -> Vec<Vec3> {
+        (0..scene.len()).map(|index| Vec3::from_slice(harmonics.of(index)) * BASE + 0.5).collect()
+    };
+    match (&scene.form, scene.form.harmonics()) {
+        (SceneForm::Ready(Form::Packed(packed)), _) => all(&packed.clone().unpack().harmonics),
+        (_, Some(harmonics)) => all(harmonics),
+        _ => Vec::new(),
     }
 }

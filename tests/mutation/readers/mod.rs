@@ -11,6 +11,7 @@ mod calibrations;
 mod cameras;
 mod checkpoint;
 mod datasets;
+mod edits;
 mod imports;
 mod package;
 mod parts;
@@ -295,6 +296,13 @@ pub static KINDS: &[Kind] = &[
         extension: "ron",
         share: 1,
         make: || Arc::new(settings::Options::new()),
+    },
+    Kind {
+        name: "edits",
+        about: "lists of edits (.ron), applied to a scene in each form",
+        extension: "ron",
+        share: 1,
+        make: || Arc::new(edits::Edits::new()),
     },
     Kind {
         name: "scores",
