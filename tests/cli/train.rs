@@ -284,7 +284,7 @@ fn opaque_images_with_poses_of_others_are_an_error_at_the_end() {
         let command =
             arguments!["train", "--data", &capture.data, "-o", &out, "--gaussians", "100", "--sh-degree", "0"];
         let short =
-            ["--steps", "300", "--evaluate-every", "300", "--validation", "times"].iter().chain(more).map(Into::into);
+            ["--steps", "1000", "--evaluate-every", "1000", "--validation", "times"].iter().chain(more).map(Into::into);
         gs4d(&[command.to_vec(), short.collect()].concat())
     };
     run(&[]).must_fail("are its poses those of its images? --trust-images skips this check");
