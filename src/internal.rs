@@ -84,8 +84,6 @@ pub mod renderer {
 /// Of `offline`: the passes of scoring and training, and each wing's private items.
 #[cfg(feature = "offline")]
 pub mod offline {
-    pub use crate::offline::forms::sliced;
-
     /// Of `engine`: the passes of scoring and training.
     pub mod engine {
         pub use crate::offline::engine::{layout::*, shaders::*};

@@ -50,7 +50,6 @@ pub use train_stage::{train_dataset, trained_path};
 use crate::gaussian::Gaussian;
 use crate::offline::compress::require_unpacked;
 use crate::offline::engine::Engine;
-use crate::offline::forms::sliced;
 use crate::offline::prune::PruneError;
 use crate::offline::prune::search::of_name;
 use crate::offline::prune::select::highest;
@@ -155,7 +154,7 @@ fn stages_of(
         let facts = Facts {
             settings,
             trained_with: &inputs.subject.scene.trained_with,
-            before: &sliced(&inputs.subject.scene)?,
+            before: &inputs.subject.scene.gaussians()?,
             after: &made.after,
             filter: &made.filter,
             package: &made.package,
@@ -208,7 +207,7 @@ fn make_package(
         if stages.is_reached() {
             return Ok(None);
         }
-        let after = sliced(&tuned)?.into_owned();
+        let after = tuned.gaussians()?.into_owned();
         let tuned = GaussianScene { filter: Some(filter.clone()), ..tuned };
         let package = compress(inputs, stages, tuned, tuning.is_some(), key)?;
         if package.len() as u64 <= inputs.limit() {

@@ -6,7 +6,6 @@
 use super::BakeError;
 use crate::codec::package;
 use crate::offline::compress::{CompressSettings, Quality, compress};
-use crate::offline::forms::sliced;
 use crate::offline::prune::select::select;
 use crate::offline::work::{Progress, write_settings};
 use crate::scene::{GaussianScene, TemporalFilter};
@@ -37,7 +36,7 @@ impl Packages<'_> {
     pub(crate) fn size_of(&self, kept: &[u32]) -> Result<u64, BakeError> {
         let mut scene = select(self.scene, kept);
         let (interval, cutoff) = (scene.trained_with.time_interval, scene.trained_with.marginal_cutoff);
-        let gaussians = sliced(&scene)?.into_owned();
+        let gaussians = scene.gaussians()?.into_owned();
         scene.filter = Some(TemporalFilter::support(gaussians.into_iter(), interval, cutoff, self.key_frames - 1));
         let options = match self.is_trained {
             true => CompressSettings::suiting(self.quality, kept.len()),

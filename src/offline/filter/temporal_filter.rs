@@ -10,7 +10,6 @@ use crate::offline::dataset::selection::{distinct_cameras, distinct_times, to_dr
 use crate::offline::engine::Engine;
 use crate::offline::engine::Purpose;
 use crate::offline::engine::memory::Pictures;
-use crate::offline::forms::sliced;
 use crate::offline::score::{ScoreEngine, ScoreError, scorer};
 use crate::offline::store::results::Key;
 use crate::offline::store::shard::{Label, Shard, part, parts};
@@ -76,7 +75,7 @@ pub fn filter(
 ) -> Result<TemporalFilter, FilterError> {
     if !needs_views(kind) {
         let (interval, cutoff) = (scene.trained_with.time_interval, scene.trained_with.marginal_cutoff);
-        let gaussians = sliced(scene)?;
+        let gaussians = scene.gaussians()?;
         return Ok(TemporalFilter::support(gaussians.iter().copied(), interval, cutoff, keys.max(2) - 1));
     }
     let runtime = unfiltered(engine, scene, views)?;

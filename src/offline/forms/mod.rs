@@ -1,16 +1,13 @@
 //! The forms of a scene, and the files of other programs.
 //!
-//! In: a scene in any form. Out: the same scene in another form, as the work needs it: the Gaussians in the runtime
-//! form ([`sliced`]), the form that is drawn ([`Subject`]), a form that a package stores ([`convert`]), files that
-//! other programs open (`export`).
+//! In: a scene in any form. Out: the same scene in another form, as the work needs it: the form that is drawn
+//! ([`Subject`]), a form that a package stores ([`convert`]), files that other programs open (`export`).
 
 pub(crate) mod convert;
 mod error;
 pub(crate) mod export;
-pub(crate) mod sliced;
 pub(crate) mod subject;
 
 pub use convert::{ConvertSettings, TargetForm, convert};
 pub use error::FormError;
-pub use sliced::sliced;
 pub use subject::Subject;

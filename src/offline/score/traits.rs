@@ -3,7 +3,6 @@
 //! In: a scene, and [`ScoreSettings`]. Out: temporal mean, variance and the factor by volume of each Gaussian.
 
 use crate::gaussian::{InvalidGaussian, Model, Parameters};
-use crate::offline::forms::sliced;
 use crate::scene::{GaussianScene, SceneForm};
 
 /// Parameters that the paper leaves open.
@@ -42,7 +41,8 @@ impl Traits {
     pub fn of(scene: &GaussianScene) -> Result<Self, InvalidGaussian> {
         // A Gaussian of constant opacity has an infinite variance, which is limited so that sums are finite. If all
         // Gaussians have it, the limit has no effect.
-        let moments = sliced(scene)?
+        let moments = scene
+            .gaussians()?
             .iter()
             .map(|gaussian| [f64::from(gaussian.mean_t), f64::from(gaussian.sigma_t).powi(2).min(LONGEST)])
             .collect();

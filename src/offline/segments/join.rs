@@ -10,7 +10,6 @@ use super::error::{SegmentsError, Shared};
 use super::forms::{append, move_form};
 use super::segment::Segment;
 use super::windows::{Frame, windows};
-use crate::offline::forms::sliced;
 use crate::offline::work::{FileError, Progress, proceed};
 use crate::scene::{
     ActiveSets, FilterKind, GaussianScene, Origin, PlaybackHints, SceneForm, TemporalFilter, TrainedWith,
@@ -223,7 +222,7 @@ fn merged(
 /// Returns the interval of the filter of each Gaussian of a segment.
 fn words(segment: &Segment, place: &Place, frame: &Frame) -> Result<Vec<u32>, SegmentsError> {
     let (scene, cutoff) = (&segment.scene, segment.scene.trained_with.marginal_cutoff);
-    let gaussians = sliced(scene).map_err(|error| segment.at(error))?;
+    let gaussians = scene.gaussians().map_err(|error| segment.at(error))?;
     windows(&gaussians, scene.filter.as_ref(), place, frame, cutoff)
         .ok_or_else(|| SegmentsError::Scattered { path: segment.path.clone() })
 }

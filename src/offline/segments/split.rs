@@ -8,7 +8,6 @@ use super::error::SegmentsError;
 use super::files::{chunk_name, chunks_in};
 use super::segment::Segment;
 use super::windows::{hulls, intervals};
-use crate::offline::forms::sliced;
 use crate::offline::prune::select::select;
 use crate::offline::work::{Progress, proceed, save, write_settings};
 use crate::scene::TemporalFilter;
@@ -97,7 +96,7 @@ fn lives(segment: &Segment, stretches: u32) -> Result<Vec<[u32; 2]>, SegmentsErr
     let filter = match &scene.filter {
         Some(filter) => filter.clone(),
         None => {
-            let gaussians = sliced(scene).map_err(|error| segment.at(error))?;
+            let gaussians = scene.gaussians().map_err(|error| segment.at(error))?;
             let (interval, cutoff) = (trained_with.time_interval, trained_with.marginal_cutoff);
             TemporalFilter::support(gaussians.iter().copied(), interval, cutoff, stretches)
         }
@@ -150,7 +149,7 @@ mod tests {
             for (chunk, file) in chunks.iter().zip(&files) {
                 let [first, last] = chunk.times;
                 let own = read(file);
-                for gaussian in sliced(&own.scene).expect("every Gaussian can be drawn").iter() {
+                for gaussian in own.scene.gaussians().expect("every Gaussian can be drawn").iter() {
                     let is_drawn = |time: f64| gaussian.marginal(time as f32) > own.scene.trained_with.marginal_cutoff;
                     assert!(first <= 0.0 || !is_drawn(first - 1e-3), "alive before {first}");
                     assert!(last >= 1.0 || !is_drawn(last + 1e-3), "alive after {last}");

@@ -5,8 +5,8 @@
 
 use super::look::Colored;
 use super::motion::Neighbor;
+use crate::codec::import::columns::SH_C0;
 use crate::gaussian::{Gaussian, Harmonics, InvalidGaussian, lifespan_reach};
-use crate::offline::forms::sliced;
 use crate::scene::{Bounds, Form, GaussianScene, SceneForm, TrainedWith};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -15,8 +15,6 @@ use rayon::prelude::*;
 const COUNT: usize = 48;
 /// Smallest opacity at the time at which a Gaussian counts: fainter ones are haze or the remains of pruning.
 const FAINTEST: f32 = 0.02;
-/// The harmonic of degree 0.
-const BASE: f32 = 0.282_094_79;
 
 /// The Gaussians of a capture that can be followed.
 pub(super) struct Cloud {
@@ -52,7 +50,7 @@ impl Cloud {
     /// The first Gaussian that cannot be drawn.
     pub(super) fn of(scene: &GaussianScene) -> Result<Self, InvalidGaussian> {
         let TrainedWith { time_interval, marginal_cutoff, .. } = scene.trained_with;
-        let (gaussians, colors) = (sliced(scene)?, colors(scene));
+        let (gaussians, colors) = (scene.gaussians()?, colors(scene));
         let reach = lifespan_reach(marginal_cutoff) as f32;
         let piece = |(index, gaussian): (usize, &Gaussian)| {
             let half = reach * gaussian.sigma_t;
@@ -135,7 +133,7 @@ impl Cloud {
 /// Returns the color of each Gaussian, independent of direction and time, 0 to 1.
 fn colors(scene: &GaussianScene) -> Vec<Vec3> {
     let all = |harmonics: &Harmonics| -> Vec<Vec3> {
-        (0..scene.len()).map(|index| Vec3::from_slice(harmonics.of(index)) * BASE + 0.5).collect()
+        (0..scene.len()).map(|index| Vec3::from_slice(harmonics.of(index)) * SH_C0 + 0.5).collect()
     };
     match (&scene.form, scene.form.harmonics()) {
         (SceneForm::Ready(Form::Packed(packed)), _) => all(&packed.clone().unpack().harmonics),

@@ -6,7 +6,6 @@ use super::batch::Batches;
 use super::evaluation::{behind, psnr};
 use crate::offline::dataset::selection::even_subset;
 use crate::offline::filter::temporal_filter::filter_of_views;
-use crate::offline::forms::sliced;
 use crate::offline::score::GpuEngine;
 use crate::offline::train::error::TrainError;
 use crate::offline::train::images::TrainingImages;
@@ -149,7 +148,7 @@ impl<'a> Session<'a> {
         }
         if let Some(segments) = self.support {
             let TrainedWith { time_interval, marginal_cutoff, .. } = scene.trained_with;
-            let gaussians = sliced(&scene)?.into_owned().into_iter();
+            let gaussians = scene.gaussians()?.into_owned().into_iter();
             scene.filter = Some(TemporalFilter::support(gaussians, time_interval, marginal_cutoff, segments));
         }
         Ok(scene)
