@@ -37,6 +37,10 @@ var<workgroup> batch_b: array<vec3<f32>, 256>;
 var<workgroup> batch_c: array<vec3<f32>, 256>;
 // Number of finished pixels of this tile.
 var<workgroup> finished: atomic<u32>;
+#ifdef SUBGROUPS_OF_8
+// Place of this thread in its subgroup.
+var<private> lane: u32;
+#endif
 
 fn put_in_batch(place: u32, slot: u32) {
     let splat = read_splat(splats[slot]);
@@ -45,17 +49,61 @@ fn put_in_batch(place: u32, slot: u32) {
     batch_c[place] = splat.color;
 }
 
-// Blends splat `i` of the batch into a pixel that is not finished.
-fn blend_one(pixel: ptr<function, Pixel>, i: u32, position: vec2<f32>) {
-    let a = batch_a[i];
+// Blends a splat, the values of a batch, into a pixel that is not finished.
+fn blend_values(pixel: ptr<function, Pixel>, a: vec4<f32>, b: vec3<f32>, c: vec3<f32>, position: vec2<f32>) {
     if a.w > (*pixel).limit {
         pass_surfaces(pixel, a.w);
         if (*pixel).done {
             return;
         }
     }
-    blend_splat(pixel, alpha_at(batch_b[i], a.z, a.xy - position), batch_c[i], a.w);
+    blend_splat(pixel, alpha_at(b, a.z, a.xy - position), c, a.w);
 }
+
+// Blends splat `i` of the batch into a pixel that is not finished.
+fn blend_one(pixel: ptr<function, Pixel>, i: u32, position: vec2<f32>) {
+    blend_values(pixel, batch_a[i], batch_b[i], batch_c[i], position);
+}
+
+// Blends the first `count` splats of the batch, one after the other.
+#ifdef SUBGROUPS_OF_8
+fn blend_batch(pixel: ptr<function, Pixel>, count: u32, at: vec2<f32>) {
+    for (var i = 0u; i < count; i += 8u) {
+        if subgroupAll((*pixel).done) {
+            break;
+        }
+        // Software drivers load from memory thread by thread: each thread loads one of eight splats for all.
+        let own = min(i + lane, count - 1u);
+        let a = batch_a[own];
+        let b = batch_b[own];
+        let c = batch_c[own];
+        let left = count - i;
+        blend_shared(pixel, subgroupBroadcast(a, 0u), subgroupBroadcast(b, 0u), subgroupBroadcast(c, 0u), 0u < left, at);
+        blend_shared(pixel, subgroupBroadcast(a, 1u), subgroupBroadcast(b, 1u), subgroupBroadcast(c, 1u), 1u < left, at);
+        blend_shared(pixel, subgroupBroadcast(a, 2u), subgroupBroadcast(b, 2u), subgroupBroadcast(c, 2u), 2u < left, at);
+        blend_shared(pixel, subgroupBroadcast(a, 3u), subgroupBroadcast(b, 3u), subgroupBroadcast(c, 3u), 3u < left, at);
+        blend_shared(pixel, subgroupBroadcast(a, 4u), subgroupBroadcast(b, 4u), subgroupBroadcast(c, 4u), 4u < left, at);
+        blend_shared(pixel, subgroupBroadcast(a, 5u), subgroupBroadcast(b, 5u), subgroupBroadcast(c, 5u), 5u < left, at);
+        blend_shared(pixel, subgroupBroadcast(a, 6u), subgroupBroadcast(b, 6u), subgroupBroadcast(c, 6u), 6u < left, at);
+        blend_shared(pixel, subgroupBroadcast(a, 7u), subgroupBroadcast(b, 7u), subgroupBroadcast(c, 7u), 7u < left, at);
+    }
+}
+
+// Blends a splat that a thread of the subgroup loaded, unless it is not `wanted` or the pixel is finished.
+fn blend_shared(
+    pixel: ptr<function, Pixel>, a: vec4<f32>, b: vec3<f32>, c: vec3<f32>, wanted: bool, position: vec2<f32>,
+) {
+    if wanted && !(*pixel).done {
+        blend_values(pixel, a, b, c, position);
+    }
+}
+#else
+fn blend_batch(pixel: ptr<function, Pixel>, count: u32, position: vec2<f32>) {
+    for (var i = 0u; i < count && !(*pixel).done; i++) {
+        blend_one(pixel, i, position);
+    }
+}
+#endif
 
 // Blends splat `i`, unless it is not below `count` or the pixel is finished.
 fn blend_if_open(pixel: ptr<function, Pixel>, i: u32, count: u32, position: vec2<f32>) {
@@ -141,7 +189,16 @@ fn lacks_pair(slot: u32, first: u32, tile: vec2<u32>) -> bool {
 }
 
 @compute @workgroup_size(256)
+#ifdef SUBGROUPS_OF_8
+fn blend(
+    @builtin(workgroup_id) tile: vec3<u32>,
+    @builtin(local_invocation_index) thread: u32,
+    @builtin(subgroup_invocation_id) place: u32,
+) {
+    lane = place;
+#else
 fn blend(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+#endif
     let at = pixel_of(tile.xy, thread);
     let position = vec2<f32>(at);
     let range = tile_ranges[tile_index(tile.xy, frame.tiles.x)];
@@ -163,9 +220,7 @@ fn blend(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
             break;
         }
         let open = !pixel.done;
-        for (var i = 0u; i < min(BATCH, end - first) && !pixel.done; i++) {
-            blend_one(&pixel, i, position);
-        }
+        blend_batch(&pixel, min(BATCH, end - first), position);
         count_finished(&pixel, open);
     }
 #ifdef MANY_AT_ONCE
@@ -202,9 +257,7 @@ fn blend(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
                 blend_many(&pixel, i, scan_total(), position);
             }
 #else
-            for (var i = 0u; i < scan_total() && !pixel.done; i++) {
-                blend_one(&pixel, i, position);
-            }
+            blend_batch(&pixel, scan_total(), position);
 #endif
             count_finished(&pixel, open);
         }

@@ -6,7 +6,7 @@ use super::device::GpuError;
 use super::device::bind::pipeline;
 use super::device::memory::catch_known;
 use super::layouts::Layouts;
-use super::shaders::{COPIED_INSTANCE, SHADERS, SUBGROUPS_OF_32, ShaderChecks, Storage};
+use super::shaders::{COPIED_INSTANCE, SHADERS, SUBGROUPS_OF_8, SUBGROUPS_OF_32, ShaderChecks, Storage};
 use std::sync::Arc;
 
 /// What a device determines about the passes.
@@ -16,7 +16,7 @@ pub(super) struct Compiler {
     checks: ShaderChecks,
     /// Whether the driver is a software driver, where threads copy the uniforms of their instance even in a dispatch of a single instance.
     is_software: bool,
-    /// [`SUBGROUPS_OF_32`], or empty if the subgroup size of the device is not always 32.
+    /// [`SUBGROUPS_OF_32`]; [`SUBGROUPS_OF_8`] on software drivers; empty if the subgroup size of the device is another one, or varies.
     pub subgroups: &'static [&'static str],
 }
 
@@ -25,13 +25,14 @@ impl Compiler {
     pub(super) fn new(device: &wgpu::Device, layouts: Arc<Layouts>, checks: ShaderChecks) -> Self {
         let info = device.adapter_info();
         let sizes = [info.subgroup_min_size, info.subgroup_max_size];
-        let is_32 = device.features().contains(wgpu::Features::SUBGROUP) && sizes == [32, 32];
-        Self {
-            layouts,
-            checks,
-            is_software: info.device_type == wgpu::DeviceType::Cpu,
-            subgroups: if is_32 { SUBGROUPS_OF_32 } else { &[] },
-        }
+        let is_software = info.device_type == wgpu::DeviceType::Cpu;
+        let subgroups: &[_] = match sizes {
+            _ if !device.features().contains(wgpu::Features::SUBGROUP) => &[],
+            [32, 32] => SUBGROUPS_OF_32,
+            [8, 8] if is_software => SUBGROUPS_OF_8,
+            _ => &[],
+        };
+        Self { layouts, checks, is_software, subgroups }
     }
 
     /// Returns the index of pipelines of passes that read a capture: 1 for pipelines that copy their instance first. `batched`: a dispatch

@@ -162,6 +162,10 @@ impl Pixels {
 /// Definitions of `sort_bins` and `blend_blocks` on devices whose subgroups always have 32 threads.
 pub const SUBGROUPS_OF_32: &[&str] = &["SUBGROUPS_OF_32"];
 
+/// Definitions of `blend` on software drivers whose subgroups always have 8 threads, and which load from memory thread by thread: a subgroup
+/// loads a splat once for all its threads.
+pub const SUBGROUPS_OF_8: &[&str] = &["SUBGROUPS_OF_8"];
+
 /// The passes of the renderer. The definitions of those that read captures are those of a [`Storage`], and [`COPIED_INSTANCE`]; of those that
 /// write pixels, [`MULTISAMPLED`] and those of a [`ColorPrecision`]. Each design has further definitions for its own passes.
 pub static SHADERS: ShaderSet = ShaderSet::new(PASSES, &[]);

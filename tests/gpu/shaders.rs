@@ -6,7 +6,7 @@
 use crate::support::composed::{compose, pass_names};
 use bevy_gs4d::internal::offline::engine::{COMPAT, COMPAT_WITHOUT_TIME, MIP_FILTER};
 use bevy_gs4d::internal::renderer::AtOnce;
-use bevy_gs4d::internal::renderer::{BINNED, COPIED_INSTANCE, MULTISAMPLED, SHADERS, SUBGROUPS_OF_32};
+use bevy_gs4d::internal::renderer::{BINNED, COPIED_INSTANCE, MULTISAMPLED, SHADERS, SUBGROUPS_OF_8, SUBGROUPS_OF_32};
 use bevy_gs4d::internal::renderer::{Blending, COUNTED, EIGHT_AT_ONCE, FEW_BINS, LARGE_BATCHES, Lists, OPAQUE};
 use bevy_gs4d::renderer::{ColorPrecision, Storage};
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
@@ -52,7 +52,7 @@ fn every_pass_composes_and_is_valid() {
     let check = |name: &str, definitions: &[&str]| {
         let uses = |own: &[&str]| definitions.iter().any(|definition| own.contains(definition));
         let mut capabilities = Capabilities::SHADER_FLOAT16_IN_FLOAT32;
-        capabilities.set(Capabilities::SUBGROUP, uses(SUBGROUPS_OF_32));
+        capabilities.set(Capabilities::SUBGROUP, uses(SUBGROUPS_OF_32) || uses(SUBGROUPS_OF_8));
         validate(name, &compose(name, definitions).map_err(|error| error.to_string())?, capabilities)
     };
     let binned = Storage::ALL
@@ -75,7 +75,8 @@ fn every_pass_composes_and_is_valid() {
     let copied: Vec<_> = copied.collect();
     let at_once = AtOnce::ALL
         .into_iter()
-        .flat_map(|at_once| [&[][..], MULTISAMPLED].map(|samples| [at_once.definitions(), samples].concat()));
+        .flat_map(|at_once| [&[][..], MULTISAMPLED].map(|samples| [at_once.definitions(), samples].concat()))
+        .flat_map(|blending| [&[][..], SUBGROUPS_OF_8].map(|device| [&blending[..], device].concat()));
     let definitions: Vec<_> = storages
         .into_iter()
         .chain(at_once)

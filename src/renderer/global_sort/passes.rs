@@ -93,7 +93,7 @@ impl SortPasses {
             self.steps.get_or_init(|| made);
         }
         if self.blend(pixels, at_once).is_none() {
-            let definitions = [&pixels.definitions(), at_once.definitions()].concat();
+            let definitions = [&pixels.definitions(), at_once.definitions(), self.compiler.subgroups].concat();
             let groups = [&layouts.pixel[pixels.index()], &layouts.global_sort.blend].map(Some);
             let made = self.compiler.pass(device, "blend", &definitions, &groups)?;
             self.blend[at_once as usize][pixels.index()].get_or_init(|| made);
