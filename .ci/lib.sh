@@ -125,6 +125,7 @@ prepare() {
   local missing=()
   step 'Preparation of the machine'
   command -v cc >/dev/null || missing+=(gcc libc6-dev)
+  command -v c++ >/dev/null || missing+=(g++)
   has_vulkan_driver || missing+=(mesa-vulkan-drivers libvulkan1)
   has_browser || missing+=(chromium)
   if [ ${#missing[@]} -gt 0 ] && command -v apt-get >/dev/null; then

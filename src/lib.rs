@@ -138,6 +138,7 @@
 //! | [`Upright`] | captures | the game; it requires [`UprightTurn`] |
 //! | [`Markers`](playback::Markers), [`FollowsClock`](playback::FollowsClock) | captures; `FollowsClock` also timelines | the game |
 //! | [`CaptureSocket`](playback::CaptureSocket), [`SocketState`](playback::SocketState) | children of captures | the game; the first requires the second |
+//! | [`CaptureCollider`](playback::CaptureCollider), [`ColliderState`](playback::ColliderState) | children of captures | the game; the first requires the second |
 //! | [`PlaybackClock`](playback::PlaybackClock) | an entity of its own; timelines | the game; the plugins on timelines |
 //! | [`TimelinePlayer`](playback::TimelinePlayer) | a timeline in the world | the game |
 //! | [`TimelineTrack`](playback::TimelineTrack), [`ClipFade`](playback::ClipFade) | children of timelines | the plugins, or the game |
@@ -153,6 +154,7 @@
 //! | [`PlaybackSystems::Clocks`](playback::PlaybackSystems::Clocks) | `Update` | advance clocks |
 //! | [`PlaybackSystems::Timelines`](playback::PlaybackSystems::Timelines) | `Update`, after `Clocks` | advance timelines, set up their tracks |
 //! | [`PlaybackSystems::Advance`](playback::PlaybackSystems::Advance) | `Update`, after `Timelines` | advance captures; send the messages about playing |
+//! | [`PlaybackSystems::Colliders`](playback::PlaybackSystems::Colliders) | `Update`, after `Advance` | give entities with colliders the mesh of the time; send [`CaptureColliderChanged`](playback::CaptureColliderChanged) |
 //! | [`PlaybackSystems::Sockets`](playback::PlaybackSystems::Sockets) | `PostUpdate`, after Bevy's `AnimationSystems`, before `TransformSystems::Propagate` | move entities with sockets |
 //! | Bevy's `VisibilitySystems::CalculateBounds` | `PostUpdate` | update the `Aabb` of captures |
 //! | [`CaptureSystems`](render::CaptureSystems) | `Core3d`, in the render world | draw captures into the target of a camera |

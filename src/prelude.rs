@@ -42,8 +42,8 @@ pub use crate::plugin::picker::{CaptureHit, CapturePicker};
 pub use crate::plugin::picking_backend::{CapturePickingCamera, CapturePickingSettings};
 #[doc(no_inline)]
 pub use crate::plugin::playback::{
-    CaptureSocket, Playback, PlaybackClock, PlaybackEnded, PlaybackLooped, PlaybackPaused, PlaybackSeeked,
-    PlaybackStarted,
+    CaptureCollider, CaptureColliderChanged, CaptureSocket, Playback, PlaybackClock, PlaybackEnded, PlaybackLooped,
+    PlaybackPaused, PlaybackSeeked, PlaybackStarted,
 };
 #[doc(no_inline)]
 pub use crate::plugin::render::{

@@ -28,8 +28,8 @@ use std::ffi::OsString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
 use verbs::{
-    ablate, bake, bench, compare, compress, convert, detail, edit, eval, export, fine_tune, fleet, footage, info, join,
-    mask, prune, render, score, socket, split, synth, train,
+    ablate, bake, bench, collide, compare, compress, convert, detail, edit, eval, export, fine_tune, fleet, footage,
+    info, join, mask, prune, render, score, socket, split, synth, train,
 };
 
 /// The exit code after a panic, a defect of this crate.
@@ -69,6 +69,7 @@ enum Verb {
     Join(join::Join),
     Split(split::SplitVerb),
     Socket(socket::SocketVerb),
+    Collide(collide::CollideVerb),
     Compare(compare::Compare),
     Synth(synth::Synth),
     Bench(bench::Bench),
@@ -99,6 +100,7 @@ impl Verb {
             Self::Join(verb) => verb.run(),
             Self::Split(verb) => verb.run(),
             Self::Socket(verb) => verb.run(),
+            Self::Collide(verb) => verb.run(),
             Self::Compare(verb) => verb.run(),
             Self::Synth(verb) => verb.run(),
             Self::Bench(verb) => verb.run(),

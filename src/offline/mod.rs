@@ -24,6 +24,7 @@
 //! | [`mod@train`] | the Gaussians are trained: from pictures alone, or to compensate for removed Gaussians |
 //! | [`edit`] | a list of edits is read, and cameras tell floaters from what stands there |
 //! | [`sockets`] | named points follow the Gaussians around them |
+//! | [`mod@collide`] | the solid parts become closed meshes, for the physics of games |
 //! | [`mod@footage`] | footage of several cameras becomes a dataset, with a verdict |
 //! | [`mod@detail`] | levels of fewer Gaussians are made, for pictures of few pixels |
 //! | [`report`] | the result of a bake, or of many, becomes a page |
@@ -31,6 +32,7 @@
 //! | [`mod@bake`] | all of this in stages, which resume, or as jobs for many machines |
 
 pub mod bake;
+pub mod collide;
 pub mod compress;
 pub mod dataset;
 pub mod detail;

@@ -143,11 +143,12 @@ impl Conversion {
     /// As [`advance`](Self::advance).
     pub(crate) fn finish(mut self) -> Result<RuntimeScene, InvalidGaussian> {
         while self.advance(usize::MAX)? {}
-        let GaussianScene { form, environment, filter, trained_with, playback, sockets, .. } = self.scene;
+        let GaussianScene { form, environment, filter, trained_with, playback, sockets, colliders, .. } = self.scene;
         let form = match form {
             SceneForm::Trained(Trained { harmonics, .. }) => Form::Sliced(Sliced { gaussians: self.sliced, harmonics }),
             SceneForm::Ready(form) => form,
         };
-        Ok(RuntimeScene { form, environment, filter, trained_with, playback, levels: self.before, sockets })
+        let levels = self.before;
+        Ok(RuntimeScene { form, environment, filter, trained_with, playback, levels, sockets, colliders })
     }
 }

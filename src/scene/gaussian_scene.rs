@@ -2,6 +2,7 @@
 //!
 //! In: the result of a codec. Out: a [`GaussianScene`], checked.
 
+use super::collider::Colliders;
 use super::environment::Environment;
 use super::filter::TemporalFilter;
 use super::form::{Form, SceneForm};
@@ -9,6 +10,7 @@ use super::provenance::{PlaybackHints, TrainedWith};
 use super::runtime_scene::{Level, RuntimeScene, check_around, check_levels};
 use super::socket::{Socket, check_sockets};
 use crate::gaussian::Model;
+use std::sync::Arc;
 
 /// A capture in memory.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,6 +29,8 @@ pub struct GaussianScene {
     pub levels: Vec<Level>,
     /// Named points that follow a part of the capture; usually none. Levels of detail have none.
     pub sockets: Vec<Socket>,
+    /// Meshes of the solid parts; usually none. Levels of detail have none. Shared, because they do not change.
+    pub colliders: Option<Arc<Colliders>>,
 }
 
 impl GaussianScene {
@@ -63,6 +67,7 @@ impl GaussianScene {
         self.form.check_parts()?;
         check_around(self.len(), self.filter.as_ref(), self.environment.as_ref())?;
         check_sockets(&self.sockets)?;
+        self.colliders.as_deref().map_or(Ok(()), Colliders::check)?;
         check_levels(&self.levels, &self.trained_with, self.environment.is_some())
     }
 }
@@ -77,6 +82,7 @@ impl From<RuntimeScene> for GaussianScene {
             playback: scene.playback,
             levels: scene.levels,
             sockets: scene.sockets,
+            colliders: scene.colliders,
         }
     }
 }

@@ -59,5 +59,6 @@ pub fn grow(
         playback: scene.playback,
         levels: Vec::new(),
         sockets: scene.sockets.clone(),
+        colliders: scene.colliders.clone(),
     })
 }

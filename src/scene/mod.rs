@@ -5,6 +5,7 @@
 //! Gaussians may have.
 
 mod bounds;
+mod collider;
 mod conversion;
 pub(crate) mod detail;
 pub mod edit;
@@ -27,6 +28,8 @@ mod socket;
 pub mod synth;
 
 pub use bounds::{Bounds, BoundsOverTime};
+pub(crate) use collider::ColliderGrid;
+pub use collider::{ColliderMesh, ColliderStretch, Colliders};
 pub(crate) use conversion::Conversion;
 pub(crate) use detail::MAX_LEVELS;
 pub use environment::Environment;

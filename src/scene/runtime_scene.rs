@@ -3,6 +3,7 @@
 //! In: Gaussians in a form that is drawn, and the other parts of a capture. Out: a [`RuntimeScene`], which returns its
 //! Gaussians and colors; an error if its parts do not fit together. A [`Level`] is a scene of fewer Gaussians.
 
+use super::collider::Colliders;
 use super::detail::{MAX_LEVELS, check_sizes};
 use super::environment::Environment;
 use super::filter::TemporalFilter;
@@ -32,9 +33,12 @@ pub struct RuntimeScene {
     pub levels: Vec<Level>,
     /// Named points that follow a part of the capture; usually none. Levels of detail have none.
     pub sockets: Vec<Socket>,
+    /// Meshes of the solid parts; usually none. Levels of detail have none. Shared, because they do not change.
+    pub colliders: Option<Arc<Colliders>>,
 }
 
-/// A level of detail: a capture of fewer Gaussians, without levels, environment map, temporal filter and sockets.
+/// A level of detail: a capture of fewer Gaussians, without levels, environment map, temporal filter, sockets and
+/// colliders.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Level {
     /// The largest size on the screen (`pixels_across`) at which it looks nearly the same as all Gaussians, pixels.
@@ -55,6 +59,7 @@ impl RuntimeScene {
             playback: PlaybackHints::default(),
             levels: Vec::new(),
             sockets: Vec::new(),
+            colliders: None,
         }
     }
 
@@ -100,6 +105,7 @@ impl RuntimeScene {
         self.form.check_parts()?;
         check_around(self.len(), self.filter.as_ref(), self.environment.as_ref())?;
         check_sockets(&self.sockets)?;
+        self.colliders.as_deref().map_or(Ok(()), Colliders::check)?;
         check_levels(&self.levels, &self.trained_with, self.environment.is_some())
     }
 
@@ -162,8 +168,11 @@ pub(super) fn check_levels(
     check_sizes(levels.iter().map(|level| level.pixels))?;
     for level in levels {
         let own = &level.scene;
-        if !own.levels.is_empty() || own.environment.is_some() || own.filter.is_some() || !own.sockets.is_empty() {
-            return Err("a level of detail that has levels, an environment map, a temporal filter or sockets itself");
+        if !own.levels.is_empty() || own.environment.is_some() || own.filter.is_some() {
+            return Err("a level of detail that has levels, an environment map or a temporal filter itself");
+        }
+        if !own.sockets.is_empty() || own.colliders.is_some() {
+            return Err("a level of detail that has sockets or colliders itself");
         }
         if level.scene.trained_with.time_interval != trained_with.time_interval {
             return Err("a level of detail of another time interval");
@@ -244,6 +253,7 @@ mod tests {
                 },
             )],
             vec![level(8.0, RuntimeScene { trained_with: other, ..empty() })],
+            vec![level(8.0, RuntimeScene { colliders: Some(Arc::default()), ..empty() })],
             (0..=MAX_LEVELS).map(|index| level(64.0 - index as f32, empty())).collect(),
         ];
         for (index, levels) in bad.into_iter().enumerate() {

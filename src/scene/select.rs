@@ -39,6 +39,7 @@ impl GaussianScene {
             playback: self.playback,
             levels: Vec::new(),
             sockets: self.sockets.clone(),
+            colliders: self.colliders.clone(),
         }
     }
 }

@@ -74,6 +74,7 @@ pub fn synthesize(settings: &SynthSettings) -> GaussianScene {
         playback: PlaybackHints { duration_seconds: settings.duration_seconds, ..PlaybackHints::default() },
         levels: Vec::new(),
         sockets: Vec::new(),
+        colliders: None,
     }
 }
 

@@ -7,6 +7,7 @@
 mod animation;
 mod app;
 mod assets;
+mod colliders;
 mod composition;
 mod detail;
 mod examples;

@@ -93,7 +93,7 @@ fn a_socket_that_does_not_exist_is_missing_and_named_once() {
     let stray = app.world_mut().spawn(CaptureSocket::new("stray")).id();
     // On this thread, of which the log is read.
     app.edit_schedule(PostUpdate, |schedule| {
-        schedule.set_executor(SingleThreadedExecutor::default());
+        schedule.set_executor(SingleThreadedExecutor::new());
     });
     let said = warnings_of(|| (0..3).for_each(|_| pass(&mut app, 0.0)));
     for entity in [foot, stray] {
@@ -116,7 +116,7 @@ fn a_socket_of_a_capture_that_is_not_loaded_waits() {
     let player = app.world_mut().spawn(GaussianCapture3d(reserved)).id();
     let hand = app.world_mut().spawn((CaptureSocket::new("hand"), ChildOf(player))).id();
     app.edit_schedule(PostUpdate, |schedule| {
-        schedule.set_executor(SingleThreadedExecutor::default());
+        schedule.set_executor(SingleThreadedExecutor::new());
     });
     let said = warnings_of(|| pass(&mut app, 0.0));
     assert_eq!(get::<SocketState>(&app, hand), SocketState::Waiting, "it waits");

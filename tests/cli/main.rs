@@ -5,6 +5,7 @@
 
 mod bad_footage;
 mod bake;
+mod collide;
 mod command;
 mod compare;
 mod compress;

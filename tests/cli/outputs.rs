@@ -42,6 +42,7 @@ fn no_verb_writes_over_an_input() {
         arguments!["prune", scene, "--scores", &scores, "--keep", "9", "-o", &scores].to_vec(),
         arguments!["mask", scene, "-o", scene].to_vec(),
         arguments!["socket", scene, "--name", "a", "--at", "0,0,0", "--time", "0", "-o", scene].to_vec(),
+        arguments!["collide", scene, "-o", scene].to_vec(),
         arguments!["mask", scene, "--filter", "interval", "--data", data, "-o", &image].to_vec(),
         arguments!["score", scene, "--data", data, "--out", scene].to_vec(),
         arguments!["score", scene, "--data", data, "--out", &trained_on].to_vec(),
@@ -112,6 +113,7 @@ fn a_bad_output_is_refused_before_any_input_is_read() {
         refused(arguments!["synth", &out, "--grow", "2", &nothing].to_vec(), reason);
         refused(arguments!["prune", &nothing, "--data", &no_data, "--keep", "9", "-o", &out].to_vec(), reason);
         refused(arguments!["mask", &nothing, "-o", &out].to_vec(), reason);
+        refused(arguments!["collide", &nothing, "-o", &out].to_vec(), reason);
         refused(arguments!["finetune", &nothing, "--data", &no_data, "-o", &out].to_vec(), reason);
         refused(arguments!["bake", &nothing, "--data", &no_data, "-o", &out].to_vec(), reason);
         refused(arguments!["train", "--data", &no_data, "-o", &out].to_vec(), reason);
@@ -125,6 +127,7 @@ fn a_bad_output_is_refused_before_any_input_is_read() {
     for out in [path("file"), path("file/frames")] {
         let reason = "not a folder";
         refused(arguments!["render", &nothing, "--orbit", "1", "--out", &out].to_vec(), reason);
+        refused(arguments!["collide", &nothing, "-o", path("out.gs4d"), "--obj", &out].to_vec(), reason);
         refused(arguments!["eval", &nothing, "--data", &no_data, "--out", &out].to_vec(), reason);
         refused(arguments!["score", &nothing, "--data", &no_data, "--variant", "all", "--out", &out].to_vec(), reason);
     }
@@ -140,6 +143,7 @@ fn devices_and_pipes_are_refused_where_a_file_is_needed() {
             arguments!["bake", &nothing, "--data", &data, "-o", device].to_vec(),
             arguments!["finetune", &nothing, "--data", &data, "-o", device].to_vec(),
             arguments!["compress", &nothing, device].to_vec(),
+            arguments!["collide", &nothing, "-o", device].to_vec(),
         ] {
             let run = gs4d(&command);
             run.must_fail(&format!("{device}: is a device or a pipe"));

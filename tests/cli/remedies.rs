@@ -101,6 +101,11 @@ const REMEDIES: &[(&str, &str, &str)] = &[
         "name the checkpoint or the lossless package",
         "compress SCENE.gs4d -o OUT.gs4d --verify 0 --codebooks 4",
     ),
+    (
+        "collide SCENE.gs4d -o OUT.gs4d --rate 100000",
+        "choose a lower --rate",
+        "collide SCENE.gs4d -o OUT.gs4d --rate 2 --level 0.05 --cells 16 --smallest 1",
+    ),
     ("info SCENE.gs4d --cutoff 2", "--cutoff: 2 is not from 1/255 to below 1", "info SCENE.gs4d --cutoff 0.1"),
 ];
 

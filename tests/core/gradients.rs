@@ -9,7 +9,7 @@ use bevy_gs4d::internal::gaussian::{self, GradientSettings, ParameterGradient, S
 use bevy_gs4d::internal::gaussian::{ALPHA_MIN, alpha_at};
 use bevy_gs4d::internal::reference::{self, PixelGradients};
 use bevy_gs4d::reference::Layer;
-use bevy_gs4d::scene::{GaussianScene, PlaybackHints, RuntimeScene, SceneForm, Trained, TrainedWith};
+use bevy_gs4d::scene::{GaussianScene, RuntimeScene, SceneForm, Trained, TrainedWith};
 use bevy_gs4d::view::{Appearance, Background, BlendSpace, Camera, Optics, RasterFov, View};
 use glam::{UVec2, Vec2, Vec3, Vec4};
 
@@ -147,9 +147,8 @@ impl Case {
             ..TrainedWith::default()
         };
         let form = SceneForm::Trained(trained.clone());
-        let playback = PlaybackHints::default();
-        let (levels, sockets) = Default::default();
-        let scene = GaussianScene { form, environment: None, filter: None, trained_with, playback, levels, sockets };
+        let (environment, filter, playback, levels, sockets, colliders) = Default::default();
+        let scene = GaussianScene { form, environment, filter, trained_with, playback, levels, sockets, colliders };
         scene.into_runtime_with(&self.slice).expect("valid Gaussians")
     }
 

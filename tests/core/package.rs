@@ -1,15 +1,18 @@
 //! The package format, tested through its public functions.
 //!
 //! In: scenes made here, and packages taken apart, changed and sealed again. Out: proof that files store scenes without
-//! loss, that every damage is detected, and that additions of a newer writer are skipped.
+//! loss, but for the points of colliders, which are rounded as told, that every damage is detected, and that additions
+//! of a newer writer are skipped.
 
 use crate::support::coded_scene::coded_scene;
 use crate::support::package_parts::Parts;
 use bevy_gs4d::codec::package::{self, MAGIC, PackageError, PackageInfo, VERSION, WriteSettings};
+use bevy_gs4d::codec::{Loading, ReadOptions};
 use bevy_gs4d::gaussian::{Gaussian, Harmonics, Model, Parameters};
+use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{
-    Environment, Form, GaussianScene, Level, PlaybackHints, RuntimeScene, SceneForm, Sliced, Socket, SocketSample,
-    Trained, TrainedCameras, TrainedWith, UpAxis,
+    ColliderMesh, ColliderStretch, Colliders, Environment, Form, GaussianScene, Level, PlaybackHints, RuntimeScene,
+    SceneForm, Sliced, Socket, SocketSample, Trained, TrainedCameras, TrainedWith, UpAxis,
 };
 use bytemuck::{Zeroable, cast_slice};
 use proptest::prelude::*;
@@ -103,6 +106,7 @@ fn scene(shape: &Shape, seed: u64) -> GaussianScene {
         playback: PlaybackHints { up: UpAxis::NegY, duration_seconds: 1.0 / 3.0 },
         levels: Vec::new(),
         sockets: Vec::new(),
+        colliders: None,
     }
 }
 
@@ -608,8 +612,8 @@ fn detailed() -> GaussianScene {
         let shape = Shape { model: None, count, ..SMALL };
         let scene = scene(&shape, 30 + count as u64);
         let SceneForm::Ready(form) = scene.form else { panic!("the runtime form") };
-        let GaussianScene { environment, filter, trained_with, playback, levels, sockets, .. } = scene;
-        let scene = RuntimeScene { form, environment, filter, trained_with, playback, levels, sockets };
+        let GaussianScene { environment, filter, trained_with, playback, levels, sockets, colliders, .. } = scene;
+        let scene = RuntimeScene { form, environment, filter, trained_with, playback, levels, sockets, colliders };
         Level { pixels, scene: Arc::new(scene) }
     };
     GaussianScene { levels: vec![level(64.0, 2), level(8.0, 1)], ..scene(&SMALL, 31) }
@@ -754,5 +758,153 @@ fn bad_sockets_are_neither_read_nor_written() {
     for bad in [twice, nested] {
         let error = package::write(Vec::new(), &bad, &WriteSettings::default()).expect_err("must be refused");
         assert!(matches!(error, PackageError::Inconsistent(_)), "{error}");
+    }
+}
+
+/// Returns a scene with colliders: a tetrahedron at rest, and two of other sizes, one after the other.
+fn with_colliders() -> GaussianScene {
+    let tetrahedron = |size: f32| ColliderMesh {
+        points: vec![[0.1; 3], [size, 0.1, 0.1], [0.1, size, 0.1], [0.1, 0.1, size]],
+        triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
+    };
+    let stretch = |from, to, size| ColliderStretch { from, to, mesh: tetrahedron(size) };
+    let stretches = vec![stretch(-0.1, 0.25, 1.0 / 3.0), stretch(0.25, 2.7, -2.0)];
+    solid(Colliders { standing: tetrahedron(3.7), stretches })
+}
+
+fn solid(colliders: Colliders) -> GaussianScene {
+    GaussianScene { colliders: Some(Arc::new(colliders)), ..scene(&SMALL, 34) }
+}
+
+fn colliders(scene: &GaussianScene) -> &Colliders {
+    scene.colliders.as_deref().expect("the scene has colliders")
+}
+
+#[test]
+fn colliders_are_read_as_they_are_rounded() {
+    let scene = with_colliders();
+    let file = pack(&scene);
+    let again = read(&file).expect("readable");
+    assert_same(&scene, &again);
+    let (plain, found) = (colliders(&scene), colliders(&again));
+    let rounded = plain.clone().rounded();
+    assert_eq!(*found, rounded, "the rounded colliders");
+    assert_ne!(*found, *plain, "a third and a tenth are no steps of the box");
+    let points = |all: &Colliders| all.meshes().flat_map(|mesh| mesh.points.clone()).collect::<Vec<_>>();
+    let half = 0.5 * (3.7 + 2.0) / 65535.0;
+    for (before, after) in points(plain).iter().flatten().zip(points(found).iter().flatten()) {
+        assert!((before - after).abs() <= half + 1e-6, "{before} and {after} are at most half a step apart");
+    }
+    let bits = |all: &Colliders| points(all).iter().map(|point| point.map(f32::to_bits)).collect::<Vec<_>>();
+    assert_eq!(bits(found), bits(&rounded), "every bit of every point");
+    assert_eq!(bits(found), bits(&rounded.clone().rounded()), "rounding again changes none");
+    assert!(file == pack(&again), "writing them again gives the same file");
+    assert!(file == pack(&solid(rounded)), "rounded colliders give the same file");
+}
+
+#[test]
+fn readers_without_colliders_skip_them() {
+    let scene = with_colliders();
+    let file = pack(&scene);
+    let info = inspect(&file).expect("readable");
+    assert!(info.is_intact() && info.header.requires.is_empty(), "readers without colliders can read the scene");
+    let mut older = Parts::of(&file).swap("    colliders: Some(", "    later: Some(");
+    for name in ["\"collider_points\"", "\"collider_triangles\""] {
+        older = older.swap(name, "\"later\"");
+    }
+    let without = read(&older.seal()).expect("readable");
+    assert!(without.colliders.is_none(), "an older reader skips them");
+    assert_same(&scene, &without);
+    let plain = GaussianScene { colliders: None, ..scene };
+    assert!(!Parts::of(&pack(&plain)).header.contains("collider"), "a package without colliders is as before");
+}
+
+#[test]
+fn colliders_of_any_size_are_read_at_once_and_in_steps() {
+    let count = 20_000;
+    let mesh = |count: u32| ColliderMesh {
+        points: (0..count).map(|index| [index as f32, (index % 7) as f32 / 10.0, -3.0]).collect(),
+        triangles: (0..count).map(|index| [index, (index + 1) % count, index * 7 % count]).collect(),
+    };
+    let stretch = ColliderStretch { from: 0.0, to: 1.0, mesh: mesh(9) };
+    let large = Colliders { standing: mesh(count), stretches: vec![stretch] };
+    for all in [Colliders::default(), large] {
+        let synthetic = synthesize(&SynthSettings { count: 9, ..SynthSettings::default() });
+        let scene = GaussianScene { colliders: Some(Arc::new(all.clone())), ..synthetic };
+        let file = pack(&scene);
+        let rounded = all.rounded();
+        assert_eq!(*colliders(&read(&file).expect("readable")), rounded, "at once");
+        let sections = inspect(&file).expect("readable").header.sections;
+        let parts = sections.iter().filter(|section| section.name == "collider_points").count();
+        assert_eq!(parts, rounded.standing.points.len().div_ceil(16_384), "sections of at most 16384 points");
+        let mut loading = Loading::new("scene.gs4d", file, &ReadOptions::default()).expect("a package");
+        while loading.advance(5_000).expect("readable") {}
+        let runtime = loading.finish().expect("the scene can be drawn");
+        assert_eq!(runtime.colliders.as_deref(), Some(&rounded), "in steps, and in the scene that is drawn");
+    }
+}
+
+#[test]
+fn damaged_colliders_are_refused() {
+    let good = Parts::of(&pack(&with_colliders()));
+    let many = format!("stretches: [{}", "(from: 0.0, to: 1.0, mesh: (points: 0, triangles: 0)), ".repeat(4096));
+    let headers = [
+        ("standing: (points: 4", "standing: (points: 5", "`collider_points` is missing, or ends early"),
+        ("standing: (points: 4", "standing: (points: 3", "`collider_points` starts at 0 and holds 12"),
+        ("standing: (points: 4", "standing: (points: 1048568", "`collider_points` is missing, or ends early"),
+        ("standing: (points: 4", "standing: (points: 1048569", "1048576 points"),
+        ("standing: (points: 4", "standing: (points: 18446744073709551615", "1048576 points"),
+        ("standing: (points: 4", "standing: (points: -4", "cannot be understood"),
+        ("triangles: 4", "triangles: 5", "`collider_triangles` is missing, or ends early"),
+        ("triangles: 4", "triangles: 3", "`collider_triangles` starts at 0 and holds 12"),
+        ("triangles: 4", "triangles: 18446744073709551615", "2097152 triangles"),
+        ("stretches: [", many.as_str(), "4096 stretches"),
+        ("from: -0.1", "from: 0.25", "ascending"),
+        ("from: -0.1", "from: NaN", "not finite"),
+        ("to: 0.25", "to: 0.5", "does not begin"),
+        ("to: 2.7", "to: inf", "not finite"),
+        ("low: (-2.0", "low: (4.0", "corners"),
+        ("low: (-2.0", "low: (-inf", "not finite"),
+        ("high: (3.7", "high: (NaN", "not finite"),
+        ("name: \"collider_points\"", "name: \"gone\"", "`collider_points` is missing"),
+        ("name: \"collider_triangles\"", "name: \"gone\"", "`collider_triangles` is missing"),
+    ];
+    for (from, to, expected) in headers {
+        let message = refusal(&good.clone().swap(from, to).seal()).to_string();
+        assert!(message.contains(expected), "{from}: {message}");
+    }
+    let shifted = good.clone().swap("standing: (points: 4", "standing: (points: 3");
+    let shifted = shifted.swap("mesh: (points: 4", "mesh: (points: 5");
+    let wild = put(good.clone(), "collider_triangles", 12, &[0xff; 12 * 12]);
+    for parts in [shifted, wild] {
+        let message = read(&parts.seal()).expect_err("must be refused").to_string();
+        assert!(message.contains("a point that does not exist"), "{message}");
+    }
+    let corner = read(&put(good, "collider_points", 12, &[0xff; 12 * 8]).seal()).expect("every position is in the box");
+    let mut points = colliders(&corner).meshes().flat_map(|mesh| &mesh.points);
+    assert!(points.all(|point| *point == [3.7; 3]), "the last position is the corner of the box");
+}
+
+#[test]
+fn bad_colliders_are_not_written() {
+    let changed = |change: fn(&mut Colliders)| {
+        let mut bad = colliders(&with_colliders()).clone();
+        change(&mut bad);
+        solid(bad)
+    };
+    let mut nested = detailed();
+    let level = nested.levels[1].scene.as_ref().clone();
+    nested.levels[1].scene = Arc::new(RuntimeScene { colliders: with_colliders().colliders, ..level });
+    for (bad, expected) in [
+        (changed(|all| all.standing.points[2][1] = f32::NAN), "a point of colliders that is not finite"),
+        (changed(|all| all.standing.points[2][1] = f32::INFINITY), "not finite"),
+        (changed(|all| all.stretches[1].mesh.triangles[3][2] = 4), "a point that does not exist"),
+        (changed(|all| all.stretches[0].to = 0.0), "does not begin"),
+        (nested, "sockets or colliders itself"),
+    ] {
+        let error = package::write(Vec::new(), &bad, &WriteSettings::default()).expect_err("must be refused");
+        let message = error.to_string();
+        assert!(matches!(error, PackageError::Inconsistent(_)), "{message}");
+        assert!(message.contains(expected), "{expected}: {message}");
     }
 }

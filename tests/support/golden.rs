@@ -103,6 +103,7 @@ fn load_view(folder: &Path, scene_name: &str, json: &Value, view: &Value) -> Gol
         playback: PlaybackHints::default(),
         levels: Vec::new(),
         sockets: Vec::new(),
+        colliders: None,
     }
     .into_runtime_with(&settings)
     .expect("golden scenes are valid");

@@ -25,6 +25,13 @@ pub(crate) fn point(text: &str) -> Result<[f32; 3], String> {
     numbers(text).ok_or_else(|| "expected three numbers, such as 0.5,-1,0".to_owned())
 }
 
+/// Parses `X0,Y0,Z0,X1,Y1,Z1`, the corners of a box: on each axis the first is below the second.
+pub(crate) fn corners(text: &str) -> Result<[[f32; 3]; 2], String> {
+    let corners = numbers::<6>(text).map(|[x0, y0, z0, x1, y1, z1]| [[x0, y0, z0], [x1, y1, z1]]);
+    let corners = corners.filter(|[low, high]| low.iter().zip(high).all(|(low, high)| low < high));
+    corners.ok_or_else(|| "expected two corners, the lower one first, such as -1,-1,0,1,1,2".to_owned())
+}
+
 /// Parses `T0,T1` with T0 before T1, in double precision: seconds since 1970 lose their fractions in single precision.
 pub(crate) fn interval(text: &str) -> Result<[f64; 2], String> {
     let time = |text: &str| text.trim().parse::<f64>().ok().filter(|time| time.is_finite());
@@ -54,10 +61,24 @@ pub(crate) fn share(text: &str) -> Result<f64, String> {
     share.ok_or_else(|| "expected a number from 0 to 1".to_owned())
 }
 
+/// Parses an opacity that something can have: a number above 0 and below 1.
+pub(crate) fn opacity(text: &str) -> Result<f32, String> {
+    let opacity = number(text).ok().filter(|opacity| *opacity > 0.0 && *opacity < 1.0);
+    opacity.ok_or_else(|| "expected a number above 0 and below 1".to_owned())
+}
+
 /// Parses a number from 0 to [`LARGEST`], in double precision.
 pub(crate) fn not_negative(text: &str) -> Result<f64, String> {
     let value = text.trim().parse::<f64>().ok().filter(|value| (0.0..=LARGEST).contains(value));
     value.ok_or_else(|| format!("expected a number from 0 to {LARGEST}"))
+}
+
+/// Returns a parser for a number from 0 to `most`.
+pub(crate) fn up_to(most: f32) -> impl TypedValueParser<Value = f32> {
+    move |text: &str| {
+        let value = number(text).ok().filter(|value| (0.0..=most).contains(value));
+        value.ok_or_else(|| format!("expected a number from 0 to {most}"))
+    }
 }
 
 /// Parses 0, or a number above it that is a normal number of single precision.
@@ -117,6 +138,8 @@ mod tests {
     fn values_are_exact() {
         assert_eq!(color("0, .5,-1"), Ok([0.0, 0.5, -1.0]), "three numbers");
         assert_eq!(size("1352x1014"), Ok(UVec2::new(1352, 1014)), "a size");
+        assert_eq!(corners("-1,-2,-3, 1,2,3"), Ok([[-1.0, -2.0, -3.0], [1.0, 2.0, 3.0]]), "a box");
+        assert_eq!(opacity("0.5"), Ok(0.5), "an opacity");
     }
 
     #[test]
@@ -129,6 +152,12 @@ mod tests {
         }
         for text in ["", "-0.1", "1.1", "nan", "80%"] {
             assert!(share(text).is_err(), "{text:?} is no share");
+        }
+        for text in ["", "0", "1", "1.5", "-0.5", "nan"] {
+            assert!(opacity(text).is_err(), "{text:?} is no opacity that something can have");
+        }
+        for text in ["", "0,0,0", "1,0,0,0,1,1", "0,0,0,1,1,0", "0,0,0,1,1,nan", "0,0,0,1,1,inf", "0,0,0,1,1,1,1"] {
+            assert!(corners(text).is_err(), "{text:?} is no box");
         }
         assert!(not_negative("-1").is_err() && not_negative("inf").is_err(), "finite and not below zero");
         assert!(not_negative("1e6").is_ok() && not_negative("1e308").is_err(), "at most the largest value");

@@ -9,6 +9,7 @@ pub(super) mod failure;
 pub(super) mod interrupt;
 pub(super) mod near;
 pub(super) mod note;
+pub(super) mod obj;
 pub(super) mod plain;
 pub(super) mod progress;
 mod remedy;

@@ -3,6 +3,7 @@
 //! In: an error with its causes. Out: one line ([`line`]): the messages, and what to do, with the options that do it.
 
 use crate::offline::bake::BakeError;
+use crate::offline::collide::CollideError;
 use crate::offline::dataset::{DatasetError, FrameProblem};
 use crate::offline::draw::DrawError;
 use crate::offline::engine::{EngineError, Purpose};
@@ -21,7 +22,7 @@ type AnyError = dyn Error + 'static;
 
 /// The remedies, a function for each type of error. It returns the remedy with the punctuation before it; `None` for
 /// errors of other types and errors without a remedy.
-const REMEDIES: [fn(&AnyError) -> Option<String>; 13] = [
+const REMEDIES: [fn(&AnyError) -> Option<String>; 14] = [
     of_engine,
     of_dataset,
     of_form,
@@ -34,6 +35,7 @@ const REMEDIES: [fn(&AnyError) -> Option<String>; 13] = [
     of_draw,
     of_footage,
     of_segments,
+    of_collide,
     of_bake,
 ];
 
@@ -189,6 +191,17 @@ fn of_segments(error: &AnyError) -> Option<String> {
         SegmentsError::Still { .. } => " (gs4d convert --duration)",
         SegmentsError::Overlap { .. } => "; without --keep-times, it begins then",
         SegmentsError::Speed { .. } => "; without --keep-times, it is stretched",
+        _ => return None,
+    };
+    Some(remedy.to_owned())
+}
+
+fn of_collide(error: &AnyError) -> Option<String> {
+    let remedy = match error.downcast_ref::<CollideError>()? {
+        CollideError::NoExtent => ": choose a box around the capture with --bounds",
+        CollideError::TooManyStretches { .. } => ": choose a lower --rate",
+        CollideError::TooLarge => ": choose fewer --cells, a lower --rate or a larger --error",
+        CollideError::NothingSolid { .. } => ": choose a lower --level or --smallest",
         _ => return None,
     };
     Some(remedy.to_owned())

@@ -21,6 +21,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use std::collections::HashMap;
 use std::fmt;
+use std::iter;
 use std::path::PathBuf;
 
 /// Show the contents of a capture (a file, or the folder of a sequence) or a dataset (a folder), and verify all
@@ -63,6 +64,7 @@ struct Facts {
     playback: PlaybackHints,
     levels: Vec<LevelFacts>,
     sockets: Vec<SocketFacts>,
+    colliders: Option<ColliderFacts>,
 }
 
 /// A level of detail, without its Gaussians.
@@ -81,6 +83,16 @@ struct SocketFacts {
     /// The first and the last time of its track, timestamp units.
     from: f32,
     to: f32,
+}
+
+/// Colliders, without their meshes.
+#[derive(Serialize)]
+struct ColliderFacts {
+    /// Number of stretches of time.
+    stretches: usize,
+    /// Numbers of points and triangles of all meshes.
+    points: usize,
+    triangles: usize,
 }
 
 /// Bounds of the Gaussians, capture units.
@@ -161,6 +173,7 @@ impl Info {
             "switches": switches_json(&facts.trained_with, &facts.playback),
             "levels": facts.levels,
             "sockets": facts.sockets,
+            "colliders": facts.colliders,
             "bounds": extent.as_ref().map(|extent| box_json(&extent.all)),
             "core": extent.as_ref().map(|extent| box_json(&extent.core)),
             "package": package.map(package_json),
@@ -187,6 +200,10 @@ impl Facts {
             playback: scene.playback,
             levels: scene.levels.iter().map(LevelFacts::of_level).collect(),
             sockets: scene.sockets.iter().map(SocketFacts::of_socket).collect(),
+            colliders: scene.colliders.as_ref().map(|colliders| {
+                let meshes = colliders.meshes().map(|mesh| [mesh.points.len(), mesh.triangles.len()]);
+                ColliderFacts::of_meshes(colliders.stretches.len(), meshes)
+            }),
         }
     }
 
@@ -213,6 +230,11 @@ impl Facts {
                 .map(|&StoredLevel { pixels }| LevelFacts { pixels, gaussians: None })
                 .collect(),
             sockets: header.sockets.iter().map(SocketFacts::of_socket).collect(),
+            colliders: header.colliders.as_ref().map(|colliders| {
+                let moving = colliders.stretches.iter().map(|stretch| &stretch.mesh);
+                let meshes = iter::once(&colliders.standing).chain(moving).map(|mesh| [mesh.points, mesh.triangles]);
+                ColliderFacts::of_meshes(colliders.stretches.len(), meshes)
+            }),
         }
     }
 
@@ -243,6 +265,10 @@ impl Facts {
             let sockets = self.sockets.iter().map(|SocketFacts { name, from, to }| format!("{name} ({from} to {to})"));
             pairs.push(("sockets", sockets.collect::<Vec<_>>().join(", ")));
         }
+        if let Some(ColliderFacts { stretches, points, triangles }) = &self.colliders {
+            let what = format!("{points} points, {triangles} triangles, {stretches} stretches of time");
+            pairs.push(("colliders", what));
+        }
         pairs
     }
 }
@@ -257,6 +283,17 @@ impl SocketFacts {
     fn of_socket(socket: &Socket) -> Self {
         let [from, to] = socket.reach().unwrap_or_default();
         Self { name: socket.name.clone(), from, to }
+    }
+}
+
+impl ColliderFacts {
+    /// Returns the facts of meshes with these numbers of points and triangles.
+    fn of_meshes(stretches: usize, meshes: impl Iterator<Item = [usize; 2]>) -> Self {
+        // A damaged package may have any numbers.
+        let [points, triangles] = meshes.fold([0usize; 2], |[points, triangles], [more_points, more_triangles]| {
+            [points.saturating_add(more_points), triangles.saturating_add(more_triangles)]
+        });
+        Self { stretches, points, triangles }
     }
 }
 
@@ -318,7 +355,7 @@ fn package_json(info: &PackageInfo) -> Value {
 }
 
 /// Returns the corners of a box with three decimals, and with more of a box smaller than a tenth of a unit.
-fn corners(bounds: &Bounds) -> String {
+pub(super) fn corners(bounds: &Bounds) -> String {
     let side = (bounds.max - bounds.min).max_element();
     let smaller = if side > 0.0 { (-side.log10()).clamp(0.0, 9.0) as usize } else { 0 };
     let decimals = 3 + smaller;
@@ -326,6 +363,7 @@ fn corners(bounds: &Bounds) -> String {
     format!("{} to {}", corner(bounds.min), corner(bounds.max))
 }
 
-fn box_json(bounds: &Bounds) -> Value {
+/// Returns the corners of a box, for programs.
+pub(super) fn box_json(bounds: &Bounds) -> Value {
     json!({ "min": bounds.min.to_array(), "max": bounds.max.to_array() })
 }

@@ -69,6 +69,9 @@ impl Join {
         if segments.iter().any(|segment| !segment.scene.sockets.is_empty()) {
             note("note: sockets are left out: the track of each ends with its segment; gs4d socket makes new ones");
         }
+        if segments.iter().any(|segment| segment.scene.colliders.is_some()) {
+            note("note: colliders are left out: they have the times of one segment; gs4d collide makes new ones");
+        }
         let times = if self.keep_times { Times::Own } else { Times::Following };
         let Joined { scene, segments, is_exact } = join(segments, times, &mut Bars::default())?;
         if !is_exact {

@@ -6,6 +6,7 @@
 pub(super) mod ablate;
 pub(super) mod bake;
 pub(super) mod bench;
+pub(super) mod collide;
 pub(super) mod compare;
 pub(super) mod compress;
 pub(super) mod convert;

@@ -18,6 +18,9 @@ pub(crate) fn of(scene: &GaussianScene, format: &Export) -> Vec<String> {
     if !scene.sockets.is_empty() {
         lost.push(format!("The {} sockets are not exported.", scene.sockets.len()));
     }
+    if scene.colliders.is_some() {
+        lost.push("The colliders are not exported.".to_owned());
+    }
     if scene.trained_with.uses_fov_sentinel() {
         lost.push(
             "The footprints of this capture were shaped by a wider field of view, which other players do not have: their footprints differ \

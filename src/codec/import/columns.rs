@@ -97,6 +97,7 @@ impl Played {
             },
             levels: Vec::new(),
             sockets: Vec::new(),
+            colliders: None,
         };
         scene.check().map_err(ImportError::damaged)?;
         Ok(scene)

@@ -4,12 +4,12 @@
 
 use std::ops::Range;
 
-/// One attribute of all Gaussians: a column of a table of words.
+/// One attribute of all Gaussians, or of another part of a scene: a column of a table of words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Attribute {
     /// Name of its sections.
     pub name: &'static str,
-    /// Rows of the table: Gaussians, or values of the environment map.
+    /// Rows of the table: Gaussians, values of the environment map, points or triangles of colliders.
     pub rows: usize,
     /// Number of words from one row to the next in memory.
     pub stride: usize,

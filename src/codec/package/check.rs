@@ -3,6 +3,7 @@
 //! In: a [`Header`]. Out: a [`PackageError`] unless its numbers fit together, so that later code can allocate by them.
 
 use super::attribute::Attribute;
+use super::colliders::{ColliderWords, StoredColliders};
 use super::error::PackageError;
 use super::header::{Header, LEVEL, StoredForm};
 use super::layout;
@@ -23,10 +24,11 @@ const RAW_PER_BYTE: u64 = 256;
 const MAX_SECTIONS: usize = 1 << 16;
 
 impl Header {
-    /// Checks that a scene whose header this is can be written: valid numbers, and parts that fit together.
-    pub(super) fn check_writable(&self, scene: &GaussianScene) -> Result<(), PackageError> {
+    /// Checks that a scene whose header this is can be written: valid numbers, and parts that fit together. `colliders`
+    /// are the words of its colliders.
+    pub(super) fn check_writable(&self, scene: &GaussianScene, colliders: &ColliderWords) -> Result<(), PackageError> {
         self.check_numbers()?;
-        self.check_scene(scene)?;
+        self.check_scene(scene, colliders)?;
         scene.check().map_err(PackageError::Inconsistent)
     }
 
@@ -48,7 +50,7 @@ impl Header {
         let attributes = self.attributes();
         let limit = unpacked_limit(file_length);
         let within = |raw: u64| if raw > limit { Err(PackageError::TooLarge { raw, limit }) } else { Ok(()) };
-        within(scene_memory(&attributes))?;
+        within(self.scene_memory(&attributes))?;
         attributes.iter().try_for_each(|attribute| check_sections(attribute, &self.sections))?;
         within(self.unpacked())?;
         self.check_level_sections()
@@ -60,7 +62,13 @@ impl Header {
         // In addition to the scene, one section at a time is decompressed.
         let decoded = self.sections.iter().filter(|s| attributes.iter().any(|attribute| attribute.name == s.name));
         let largest = decoded.map(|section| section.raw_length as u64).max().unwrap_or_default();
-        scene_memory(&attributes).saturating_add(largest)
+        self.scene_memory(&attributes).saturating_add(largest)
+    }
+
+    /// Returns the bytes of the tables of all attributes, and of the colliders, which are decoded from theirs.
+    fn scene_memory(&self, attributes: &[Attribute]) -> u64 {
+        let colliders = self.colliders.as_ref().map(StoredColliders::memory).unwrap_or_default();
+        attributes.iter().fold(colliders, |sum, attribute| sum.saturating_add(attribute.memory()))
     }
 
     /// Checks that each level of detail has its section, in order.
@@ -129,6 +137,7 @@ impl Header {
         sane(self.levels.len() <= MAX_LEVELS, "more levels of detail than a capture may have")?;
         check_sizes(self.levels.iter().map(|level| level.pixels)).map_err(PackageError::Inconsistent)?;
         check_sockets(&self.sockets).map_err(PackageError::Inconsistent)?;
+        self.colliders.as_ref().map_or(Ok(()), StoredColliders::check).map_err(PackageError::Inconsistent)?;
         let duration = self.playback.duration_seconds;
         sane(duration.is_finite() && duration >= 0.0, "the playback duration must be a finite number, zero or above")
     }
@@ -156,9 +165,9 @@ impl Header {
         }
     }
 
-    /// Checks that the scene has exactly the values that these numbers require.
-    pub(super) fn check_scene(&self, scene: &GaussianScene) -> Result<(), PackageError> {
-        let fits = |a: &Attribute| a.rows.checked_mul(a.stride) == Some(layout::words(scene, a.name).len());
+    /// Checks that the scene and the words of its colliders have exactly the values that these numbers require.
+    pub(super) fn check_scene(&self, scene: &GaussianScene, colliders: &ColliderWords) -> Result<(), PackageError> {
+        let fits = |a: &Attribute| a.rows.checked_mul(a.stride) == Some(layout::words(scene, colliders, a.name).len());
         if !self.attributes().iter().all(fits) {
             return Err(PackageError::Inconsistent("the attributes of the scene differ in length"));
         }
@@ -200,9 +209,4 @@ fn check_sections(attribute: &Attribute, sections: &[Section]) -> Result<(), Pac
 /// Returns the bytes that a package of this length may take when it is read.
 pub(super) fn unpacked_limit(file_length: u64) -> u64 {
     RAW_PER_BYTE.saturating_mul(file_length).saturating_add(RAW_FLOOR).min(isize::MAX as u64)
-}
-
-/// Returns the bytes of the tables of all attributes.
-fn scene_memory(attributes: &[Attribute]) -> u64 {
-    attributes.iter().fold(0u64, |sum, attribute| sum.saturating_add(attribute.memory()))
 }

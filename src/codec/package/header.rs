@@ -4,6 +4,7 @@
 //! in the order of the file. `check.rs` has its checks.
 
 use super::attribute::Attribute;
+use super::colliders::StoredColliders;
 use super::error::PackageError;
 use super::section::Section;
 use crate::gaussian::{Gaussian, MARGINAL_CUTOFF, Model};
@@ -50,6 +51,9 @@ pub struct Header {
     /// Named points that follow a part of the capture. Levels of detail have none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sockets: Vec<Socket>,
+    /// Meshes of the solid parts, without their points and triangles. Levels of detail have none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub colliders: Option<StoredColliders>,
     /// The section table, in the order of the file.
     pub sections: Vec<Section>,
 }
@@ -170,6 +174,7 @@ impl Header {
             playback: scene.playback,
             levels: scene.levels.iter().map(|level| StoredLevel { pixels: level.pixels }).collect(),
             sockets: scene.sockets.clone(),
+            colliders: scene.colliders.as_deref().map(StoredColliders::of),
             sections: Vec::new(),
         }
     }
@@ -267,6 +272,11 @@ impl Header {
             let texels = (size.width as usize).saturating_mul(size.height as usize);
             let rows = texels.saturating_mul(3);
             attributes.push(Attribute { name: "environment", rows, stride: 1, offset: 0, width: 1 });
+        }
+        if let Some([points, triangles]) = self.colliders.as_ref().map(StoredColliders::counts) {
+            let table = |name, rows, width| Attribute { name, rows, stride: width, offset: 0, width };
+            attributes.push(table("collider_points", points, 2));
+            attributes.push(table("collider_triangles", triangles, 3));
         }
         attributes
     }

@@ -1,8 +1,9 @@
 //! The values of a scene in memory, as tables of words.
 //!
-//! In: a [`Header`] or a scene. Out: a blank scene of the header's size, made at once or in steps, and the 32-bit words
-//! of each attribute of a scene.
+//! In: a [`Header`] or a scene, and the words of its colliders, which are not values of the scene. Out: a blank scene
+//! of the header's size, made at once or in steps, and the 32-bit words of each attribute of a scene.
 
+use super::colliders::{ColliderWords, StoredColliders};
 use super::header::{Header, StoredForm};
 use crate::gaussian::{Harmonics, Model, Parameters};
 use crate::scene::{
@@ -11,7 +12,8 @@ use crate::scene::{
 };
 use bytemuck::{Zeroable, cast_slice, cast_slice_mut};
 
-/// Returns a scene of the header's form without values, which [`grow`] adds. The header must have been checked.
+/// Returns a scene of the header's form without values, which [`grow`] adds, and without colliders. The header must
+/// have been checked.
 pub(super) fn empty(header: &Header) -> GaussianScene {
     let harmonics = Harmonics {
         coefficients: header.coefficients,
@@ -51,11 +53,13 @@ pub(super) fn empty(header: &Header) -> GaussianScene {
         playback: header.playback,
         levels: Vec::new(),
         sockets: header.sockets.clone(),
+        colliders: None,
     }
 }
 
-/// Adds values of zero to an [`empty`] scene, about `bytes` at most. Returns whether it has the header's size.
-pub(super) fn grow(scene: &mut GaussianScene, header: &Header, bytes: usize) -> bool {
+/// Adds values of zero to an [`empty`] scene and to the words of its colliders, about `bytes` at most. Returns whether
+/// they have the header's size.
+pub(super) fn grow(scene: &mut GaussianScene, colliders: &mut ColliderWords, header: &Header, bytes: usize) -> bool {
     let (count, mut zeros) = (header.gaussians, Zeros { left: bytes, complete: true });
     let colors = count * header.coefficients * 3;
     match &mut scene.form {
@@ -101,6 +105,10 @@ pub(super) fn grow(scene: &mut GaussianScene, header: &Header, bytes: usize) -> 
     if let Some(map) = &mut scene.environment {
         zeros.fill(&mut map.texels, 3 * map.width as usize * map.height as usize);
     }
+    if let Some([points, triangles]) = header.colliders.as_ref().map(StoredColliders::counts) {
+        zeros.fill(&mut colliders.points, points);
+        zeros.fill(&mut colliders.triangles, triangles);
+    }
     zeros.complete
 }
 
@@ -129,8 +137,10 @@ impl Zeros {
 
 /// Returns the table of words that contains the attribute of this name; empty if the scene has no such attribute. Words
 /// rather than floats, so that NaN payloads are preserved.
-pub(super) fn words<'a>(scene: &'a GaussianScene, name: &str) -> &'a [u32] {
+pub(super) fn words<'a>(scene: &'a GaussianScene, colliders: &'a ColliderWords, name: &str) -> &'a [u32] {
     match name {
+        "collider_points" => cast_slice(&colliders.points),
+        "collider_triangles" => cast_slice(&colliders.triangles),
         "filter" => match scene.filter.as_ref().map(|filter| &filter.sets) {
             Some(ActiveSets::Bits(words) | ActiveSets::Intervals(words)) => words,
             None => &[],
@@ -170,8 +180,14 @@ fn words_of_packed<'a>(packed: &'a PackedScene, name: &str) -> &'a [u32] {
 }
 
 /// Returns the same as [`words`], mutable.
-pub(super) fn words_mut<'a>(scene: &'a mut GaussianScene, name: &str) -> &'a mut [u32] {
+pub(super) fn words_mut<'a>(
+    scene: &'a mut GaussianScene,
+    colliders: &'a mut ColliderWords,
+    name: &str,
+) -> &'a mut [u32] {
     match name {
+        "collider_points" => cast_slice_mut(&mut colliders.points),
+        "collider_triangles" => cast_slice_mut(&mut colliders.triangles),
         "filter" => match scene.filter.as_mut().map(|filter| &mut filter.sets) {
             Some(ActiveSets::Bits(words) | ActiveSets::Intervals(words)) => words,
             None => &mut [],

@@ -1,15 +1,17 @@
 //! The package format `.gs4d`: written once, loaded often, with a checksum on every byte.
 //!
-//! In: a [`GaussianScene`]. Out: a file, and from it the same scene, bit for bit. `docs/format.md` has the layout.
+//! In: a [`GaussianScene`]. Out: a file, and from it the same scene, bit for bit, apart from the points of colliders,
+//! which are [rounded](crate::scene::Colliders::rounded). `docs/format.md` has the layout.
 //!
 //! A package is a fixed start ([`MAGIC`], [`VERSION`], length and checksum of the header), a [`Header`] in RON, and the
 //! sections that the header lists. A section holds one attribute of a run of Gaussians, split into byte planes
 //! (`planes`), compressed and checksummed on its own. The order is geometry, first color coefficients, the other
-//! coefficients, temporal filter, environment map, levels of detail, each of which is a package itself. A reader skips
-//! unknown sections, and refuses a package whose header requires an unknown feature.
+//! coefficients, temporal filter, environment map, colliders, levels of detail, each of which is a package itself. A
+//! reader skips unknown sections, and refuses a package whose header requires an unknown feature.
 
 mod attribute;
 mod check;
+mod colliders;
 mod envelope;
 mod error;
 mod header;
@@ -20,6 +22,7 @@ mod planes;
 mod reading;
 pub(crate) mod section;
 
+pub use colliders::{StoredColliders, StoredMesh, StoredStretch};
 pub use envelope::{MAGIC, VERSION};
 pub use error::PackageError;
 pub use header::{EnvironmentSize, Header, StoredFilter, StoredForm, StoredLevel};
@@ -29,6 +32,7 @@ pub use section::Section;
 use super::options::ReadOptions;
 use crate::scene::GaussianScene;
 use attribute::Attribute;
+use colliders::ColliderWords;
 use header::LEVEL;
 use memory_limit::{MemoryLimit, of_level};
 use rayon::prelude::*;
@@ -80,14 +84,16 @@ impl PackageInfo {
     }
 }
 
-/// Writes a scene without loss. The same scene and settings give the same bytes.
+/// Writes a scene without loss, apart from the points of colliders, which are
+/// [rounded](crate::scene::Colliders::rounded). The same scene and settings give the same bytes.
 ///
 /// # Errors
 /// [`PackageError::Inconsistent`] for a scene whose parts do not fit together, [`PackageError::TooLarge`] for a scene
 /// that compresses so well that a reader would refuse it as a decompression bomb, and errors of the writer.
 pub fn write<W: Write>(mut writer: W, scene: &GaussianScene, settings: &WriteSettings) -> Result<(), PackageError> {
     let mut header = Header::of(scene);
-    header.check_writable(scene)?;
+    let colliders = scene.colliders.as_deref().map(ColliderWords::of).unwrap_or_default();
+    header.check_writable(scene, &colliders)?;
     let level = settings.level.clamp(1, 19);
     let is_packed = matches!(header.form, StoredForm::Packed { .. });
     let rows = |attribute: &Attribute| {
@@ -96,7 +102,10 @@ pub fn write<W: Write>(mut writer: W, scene: &GaussianScene, settings: &WriteSet
     let runs: Vec<_> = header.attributes().into_iter().flat_map(|a| a.runs(rows(&a))).collect();
     let encoded = runs
         .into_par_iter()
-        .map(|(attribute, rows)| section::encode(layout::words(scene, attribute.name), &attribute, rows, level))
+        .map(|(attribute, rows)| {
+            let words = layout::words(scene, &colliders, attribute.name);
+            section::encode(words, &attribute, rows, level)
+        })
         .collect::<Result<Vec<_>, _>>()?;
     let (mut sections, mut bodies): (Vec<_>, Vec<_>) = encoded.into_iter().unzip();
     let first_level = bodies.len();

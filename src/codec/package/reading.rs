@@ -4,6 +4,7 @@
 //! piece of the scene, reads a piece of a section, decompresses one, or writes one into the scene.
 
 use super::attribute::Attribute;
+use super::colliders::ColliderWords;
 use super::envelope;
 use super::error::PackageError;
 use super::header::{Header, LEVEL};
@@ -31,6 +32,8 @@ struct Sections {
     header: Header,
     attributes: Vec<Attribute>,
     scene: GaussianScene,
+    /// The words of the colliders, which the scene gets when all sections have been read.
+    colliders: ColliderWords,
     /// Whether the scene has all of its values, which are zero until they have been read.
     is_grown: bool,
     /// Index of the next section, and what has been begun: its body, or the decompression of the section before.
@@ -119,9 +122,10 @@ impl<R: Read + Seek> Reading<R> {
     /// A damaged section; parts that contradict each other.
     pub(crate) fn finish(mut self) -> Result<GaussianScene, PackageError> {
         while self.advance(usize::MAX)? {}
-        let Sections { header, mut scene, .. } = self.sections;
-        let sized = header.levels.iter().zip(self.levels);
-        scene.levels = sized.map(|(stored, scene)| Level { pixels: stored.pixels, scene: Arc::new(scene) }).collect();
+        let Self { mut sections, levels, .. } = self;
+        let sized = std::mem::take(&mut sections.header.levels).into_iter().zip(levels);
+        let levels = sized.map(|(stored, scene)| Level { pixels: stored.pixels, scene: Arc::new(scene) }).collect();
+        let scene = GaussianScene { levels, ..sections.into_scene() };
         scene.check().map_err(PackageError::Inconsistent)?;
         Ok(scene)
     }
@@ -141,19 +145,19 @@ impl Sections {
     /// Creates an empty scene for the sections of a checked header.
     fn new(header: Header) -> Self {
         let (scene, attributes) = (layout::empty(&header), header.attributes());
-        let (is_grown, next, body, begun, memory, planes) = Default::default();
-        Self { header, attributes, scene, is_grown, next, body, begun, memory, planes }
+        let (colliders, is_grown, next, body, begun, memory, planes) = Default::default();
+        Self { header, attributes, scene, colliders, is_grown, next, body, begun, memory, planes }
     }
 
     /// Does one step with about `bytes`.
     fn advance(&mut self, reader: &mut impl Read, bytes: usize) -> Result<Step, PackageError> {
         let bytes = bytes.max(1);
         if !self.is_grown {
-            if !layout::grow(&mut self.scene, &self.header, bytes) {
+            if !layout::grow(&mut self.scene, &mut self.colliders, &self.header, bytes) {
                 return Ok(Step::Part);
             }
             // Values are written at positions from the header: the tables must have the sizes of the header.
-            self.header.check_scene(&self.scene)?;
+            self.header.check_scene(&self.scene, &self.colliders)?;
             self.is_grown = true;
         }
         if self.begun.is_some() {
@@ -203,7 +207,7 @@ impl Sections {
         if begun.joined < section.count {
             let rows = (bytes / (attribute.width * 4).max(1)).max(1);
             let end = section.count.min(begun.joined.saturating_add(rows));
-            let words = layout::words_mut(&mut self.scene, attribute.name);
+            let words = layout::words_mut(&mut self.scene, &mut self.colliders, attribute.name);
             let rows = section.first..section.first + section.count;
             planes::join(&self.planes, attribute, rows, begun.joined..end, words);
             begun.joined = end;
@@ -221,13 +225,21 @@ impl Sections {
         Ok(())
     }
 
+    /// Returns the scene, without levels of detail, of which all sections have been read. Its parts are not checked.
+    fn into_scene(self) -> GaussianScene {
+        let Self { header, scene, colliders, .. } = self;
+        let colliders = header.colliders.map(|stored| Arc::new(colliders.into_colliders(&stored)));
+        GaussianScene { colliders, ..scene }
+    }
+
     /// Returns the scene of a level of detail of which all sections have been read.
     fn into_level(self) -> Result<RuntimeScene, PackageError> {
-        let SceneForm::Ready(form) = self.scene.form else {
+        let scene = self.into_scene();
+        let GaussianScene { form, environment, filter, trained_with, playback, levels, sockets, colliders } = scene;
+        let SceneForm::Ready(form) = form else {
             return Err(PackageError::Inconsistent("a level of detail in the trained form"));
         };
-        let GaussianScene { environment, filter, trained_with, playback, sockets, .. } = self.scene;
-        Ok(RuntimeScene { form, environment, filter, trained_with, playback, levels: Vec::new(), sockets })
+        Ok(RuntimeScene { form, environment, filter, trained_with, playback, levels, sockets, colliders })
     }
 }
 

@@ -149,6 +149,7 @@ impl Maker<'_> {
             playback: self.full.playback,
             levels: Vec::new(),
             sockets: Vec::new(),
+            colliders: None,
         }
     }
 

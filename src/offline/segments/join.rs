@@ -81,8 +81,8 @@ pub fn join(mut segments: Vec<Segment>, times: Times, progress: &mut dyn Progres
         count,
         sets: ActiveSets::Intervals(intervals),
     };
-    let (filter, (levels, sockets)) = (Some(filter), Default::default());
-    let scene = GaussianScene { form, environment, filter, trained_with, playback, levels, sockets };
+    let (filter, (levels, sockets, colliders)) = (Some(filter), Default::default());
+    let scene = GaussianScene { form, environment, filter, trained_with, playback, levels, sockets, colliders };
     Ok(Joined { scene, segments, is_exact: grid.is_exact })
 }
 

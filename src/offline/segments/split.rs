@@ -69,10 +69,11 @@ impl Split {
         for (run, path) in self.runs.iter().zip(self.paths(folder)) {
             proceed(progress)?;
             let mut scene = select(&segment.scene, &run.gaussians);
-            // All chunks have one environment map, and the same sockets, in the first file.
+            // All chunks have one environment map, and the same sockets and colliders, in the first file.
             scene.environment = scene.environment.filter(|_| chunks.is_empty());
             if !chunks.is_empty() {
                 scene.sockets.clear();
+                scene.colliders = None;
             }
             save(&path, &scene, &write_settings(&scene.form, level))?;
             chunks.push(Chunk { path, times: self.times(segment, run), gaussians: run.gaussians.len() });
@@ -126,6 +127,7 @@ mod tests {
     use crate::codec::{self, ReadOptions};
     use crate::offline::work::NoProgress;
     use crate::scene::synth::{SynthSettings, synthesize};
+    use std::sync::Arc;
 
     fn read(path: &Path) -> Segment {
         let scene = codec::load(path, &ReadOptions::default()).expect("the package can be read");
@@ -135,7 +137,8 @@ mod tests {
     #[test]
     fn chunks_are_the_whole_capture_and_united_they_stay_as_they_are() {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let scene = synthesize(&SynthSettings { count: 4000, ..SynthSettings::default() });
+        let mut scene = synthesize(&SynthSettings { count: 4000, ..SynthSettings::default() });
+        scene.colliders = Some(Arc::default());
         let mut whole = Segment { path: PathBuf::from("whole.gs4d"), scene };
         let mut before = Vec::new();
         for round in 0..2 {
@@ -149,6 +152,7 @@ mod tests {
             for (chunk, file) in chunks.iter().zip(&files) {
                 let [first, last] = chunk.times;
                 let own = read(file);
+                assert_eq!(own.scene.colliders.is_some(), *file == files[0], "the first file has the colliders");
                 for gaussian in own.scene.gaussians().expect("every Gaussian can be drawn").iter() {
                     let is_drawn = |time: f64| gaussian.marginal(time as f32) > own.scene.trained_with.marginal_cutoff;
                     assert!(first <= 0.0 || !is_drawn(first - 1e-3), "alive before {first}");
@@ -157,6 +161,7 @@ mod tests {
             }
             let united = unite(files.iter().map(|file| read(file)).collect(), &mut NoProgress);
             whole.scene = united.expect("chunks of one capture");
+            assert!(whole.scene.colliders.is_some(), "the whole capture has the colliders");
             let bytes: Vec<Vec<u8>> = files.iter().map(|file| std::fs::read(file).expect("it was written")).collect();
             assert!(round == 0 || bytes == before, "the chunks of united chunks are the same files");
             before = bytes;

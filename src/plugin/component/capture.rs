@@ -215,6 +215,7 @@ fn outline(scene: &RuntimeScene) -> RuntimeScene {
         playback: scene.playback,
         levels: scene.levels.iter().map(level).collect(),
         sockets: scene.sockets.clone(),
+        colliders: scene.colliders.clone(),
         ..RuntimeScene::sliced(Vec::new(), Harmonics::default())
     }
 }

@@ -13,10 +13,14 @@
 //!                                     │ a capture, its Playback, a ClipFade
 //!                                     ▼
 //!  Time ──────────────────────▶ Playback::time         Advance
+//!                                     │
+//!                                     ▼
+//!                               ColliderState          Colliders
 //! ```
 //!
 //! A playback can follow a clock or another player ([`FollowsClock`]). [`Markers`] are named times of one capture, like
-//! the markers of a timeline. A [`CaptureSocket`] follows a named point of a capture.
+//! the markers of a timeline. A [`CaptureSocket`] follows a named point of a capture; a [`CaptureCollider`] has the
+//! mesh of what is solid in it.
 //!
 //! Bevy's own animations may animate any field of a [`Playback`] but `repeat` through
 //! `animated_field!(Playback::speed)`. They run in `PostUpdate`: a `time` set on a capture is drawn in the same frame;
@@ -24,6 +28,7 @@
 
 mod advance;
 mod clock;
+mod collider;
 mod component;
 mod drive;
 mod markers;
@@ -38,6 +43,7 @@ mod systems;
 mod timeline;
 
 pub use clock::{ClockSource, FollowsClock, PlaybackClock};
+pub use collider::{CaptureCollider, CaptureColliderChanged, ColliderState, collider_mesh};
 pub use component::Playback;
 pub use markers::{Marker, Markers};
 pub use messages::{

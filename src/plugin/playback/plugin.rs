@@ -3,6 +3,7 @@
 //! In: an app with Bevy's `AssetPlugin` and `TimePlugin`. Out: advancing clocks, timelines and captures.
 
 use super::clock::PlaybackClock;
+use super::collider::{CaptureCollider, CaptureColliderChanged, update_colliders};
 use super::component::Playback;
 use super::messages::{
     MarkerReached, PlaybackEnded, PlaybackLooped, PlaybackPaused, PlaybackSeeked, PlaybackStarted, SegmentBoundCrossed,
@@ -44,7 +45,7 @@ impl Plugin for CapturePlaybackPlugin {
 }
 
 fn add(app: &mut App) {
-    use PlaybackSystems::{Advance, Clocks, Sockets, Timelines};
+    use PlaybackSystems::{Advance, Clocks, Colliders, Sockets, Timelines};
     require_playback(app);
     app.init_asset::<Timeline>()
         .init_asset_loader::<TimelineLoader>()
@@ -55,7 +56,8 @@ fn add(app: &mut App) {
         .add_message::<MarkerReached>()
         .add_message::<PlaybackLooped>()
         .add_message::<PlaybackEnded>()
-        .configure_sets(Update, (Clocks, Timelines, Advance).chain())
+        .add_message::<CaptureColliderChanged>()
+        .configure_sets(Update, (Clocks, Timelines, Advance, Colliders).chain())
         .configure_sets(PostUpdate, Sockets.after(AnimationSystems).before(TransformSystems::Propagate))
         .add_systems(
             Update,
@@ -66,6 +68,7 @@ fn add(app: &mut App) {
                     .run_if(any_with_component::<TimelinePlayer>)
                     .in_set(Timelines),
                 advance_captures.in_set(Advance),
+                update_colliders.run_if(any_with_component::<CaptureCollider>).in_set(Colliders),
             ),
         )
         .add_systems(PostUpdate, place_sockets.run_if(any_with_component::<CaptureSocket>).in_set(Sockets))

@@ -32,6 +32,10 @@ pub enum PlaybackSystems {
     /// Captures advance. Systems `.before` this set can change the speed; systems `.after` it read the time that will
     /// be drawn, and may still change it.
     Advance,
+    /// Entities with a [`CaptureCollider`](super::CaptureCollider) get the mesh of the time of their capture. Systems
+    /// `.after` this set, physics in `PostUpdate`, and in the next frame that in the fixed schedules, have that mesh. A
+    /// time that is changed after this set, as by Bevy's animations, counts in the next frame.
+    Colliders,
     /// In `PostUpdate`, after Bevy's animations, which may change the time, and before transforms are propagated:
     /// entities with a [`CaptureSocket`](super::CaptureSocket) get their transforms.
     Sockets,

@@ -68,7 +68,7 @@ pub struct Kind {
 pub static KINDS: &[Kind] = &[
     Kind {
         name: "package",
-        about: "packages (.gs4d) in every form, with filters and environment maps",
+        about: "packages (.gs4d) in every form, with filters, environment maps and colliders",
         extension: "gs4d",
         share: 1,
         make: || Arc::new(package::Packages::new()),

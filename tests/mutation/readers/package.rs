@@ -9,14 +9,16 @@ use crate::change::{bytes, gaussians, numbers, text};
 use crate::support::packed_scene;
 use crate::support::random::Random;
 use bevy_gs4d::codec::package::{
-    self, EnvironmentSize, Header, MAGIC, Section, StoredFilter, StoredForm, VERSION, WriteSettings,
+    self, EnvironmentSize, Header, MAGIC, Section, StoredColliders, StoredFilter, StoredForm, StoredMesh, VERSION,
+    WriteSettings,
 };
 use bevy_gs4d::gaussian::{Model, Parameters};
 use bevy_gs4d::internal::codec::{FLOAT_PLANES, PACKAGE};
 use bevy_gs4d::offline::compress::compress;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{
-    Environment, FilterKind, GaussianScene, Level, RuntimeScene, SceneForm, TemporalFilter, Trained,
+    ColliderMesh, ColliderStretch, Colliders, Environment, FilterKind, GaussianScene, Level, RuntimeScene, SceneForm,
+    TemporalFilter, Trained,
 };
 use std::io::Cursor;
 use std::sync::Arc;
@@ -86,6 +88,7 @@ fn scenes() -> Vec<GaussianScene> {
     }
     let texels = (0..24).map(|at| at as f32 / 24.0).collect();
     surrounded.environment = Some(Environment { width: 4, height: 2, texels });
+    surrounded.colliders = Some(Arc::new(colliders()));
     let sliced = packed_scene::scene(40, 0, 0);
     // Forty segments are smaller as intervals.
     let mut interval = packed_scene::scene(40, 1, 0);
@@ -102,6 +105,7 @@ fn scenes() -> Vec<GaussianScene> {
             Level { pixels, scene: Arc::new(scene) }
         })
         .to_vec();
+    detailed.colliders = Some(Arc::new(colliders()));
     vec![
         detailed.into(),
         rotated,
@@ -115,6 +119,17 @@ fn scenes() -> Vec<GaussianScene> {
         pack(0, 0, &[]),
         synthesize(&SynthSettings { count: 0, ..SynthSettings::default() }),
     ]
+}
+
+/// Returns a tetrahedron at rest, one that grows, and nothing afterwards.
+fn colliders() -> Colliders {
+    let tetrahedron = |size: f32| ColliderMesh {
+        points: vec![[0.0; 3], [size, 0.0, 0.0], [0.0, size, 0.0], [0.0, 0.0, size]],
+        triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
+    };
+    let meshes = [(0.0, tetrahedron(0.3)), (0.25, tetrahedron(0.7)), (0.5, ColliderMesh::default())];
+    let stretches = meshes.map(|(from, mesh)| ColliderStretch { from, to: from + 0.25, mesh });
+    Colliders { standing: tetrahedron(-1.0), stretches: stretches.into() }
 }
 
 impl Parts {
@@ -307,7 +322,8 @@ fn change_number(header: &mut Header, random: &mut Random) {
     const COEFFICIENTS: [usize; 14] = [0, 1, 2, 4, 5, 9, 10, 15, 16, 17, 32, 33, 48, 49];
     let any = random.one_in(5).then(|| numbers::whole(random));
     let small = |random: &mut Random| any.map_or(random.below(5) as u32, |any| any as u32);
-    match random.below(9) {
+    match random.below(10) {
+        9 => change_colliders(&mut header.colliders, random),
         8 => {
             let at = random.below(header.levels.len());
             if let Some(level) = header.levels.get_mut(at) {
@@ -329,6 +345,24 @@ fn change_number(header: &mut Header, random: &mut Random) {
             header.filter = Some(filter).filter(|_| !random.one_in(3));
         }
         _ => header.form = form(random),
+    }
+}
+
+/// Changes one number of colliders, or takes them away.
+fn change_colliders(colliders: &mut Option<StoredColliders>, random: &mut Random) {
+    let Some(StoredColliders { low, high, standing, stretches }) = colliders else { return };
+    let (at, axis, any) = (random.below(stretches.len()), random.below(3), numbers::float(random));
+    let count = random.below(9);
+    let count = if random.one_in(3) { numbers::whole(random) as usize } else { count };
+    match (random.below(8), stretches.get_mut(at)) {
+        (0, _) => low[axis] = any,
+        (1, _) => high[axis] = any,
+        (2, Some(stretch)) => stretch.from = any,
+        (3, Some(stretch)) => stretch.to = any,
+        (4, Some(stretch)) => stretch.mesh = StoredMesh { points: count, ..stretch.mesh },
+        (5, Some(stretch)) => stretch.mesh = StoredMesh { triangles: count, ..stretch.mesh },
+        (6, _) => *standing = StoredMesh { points: count, ..*standing },
+        _ => *colliders = None,
     }
 }
 
@@ -418,6 +452,12 @@ fn layout(header: &Header) -> Vec<(&'static str, usize, usize)> {
     }
     if let Some(size) = header.environment {
         sections.push(("environment", (size.width as usize).saturating_mul(size.height as usize).saturating_mul(3), 1));
+    }
+    if let Some(StoredColliders { standing, stretches, .. }) = &header.colliders {
+        let meshes = || stretches.iter().map(|stretch| stretch.mesh).chain([*standing]);
+        let sum = |count: fn(StoredMesh) -> usize| meshes().map(count).fold(0, usize::saturating_add);
+        sections.push(("collider_points", sum(|mesh| mesh.points), 2));
+        sections.push(("collider_triangles", sum(|mesh| mesh.triangles), 3));
     }
     sections
 }

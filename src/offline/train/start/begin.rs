@@ -136,6 +136,7 @@ pub fn begin(
         playback,
         levels: Vec::new(),
         sockets: Vec::new(),
+        colliders: None,
     };
     Ok((scene, start))
 }
