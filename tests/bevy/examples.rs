@@ -99,6 +99,7 @@ fn draw(example: &str, options: &[&str], expected: usize) {
 }
 
 #[test]
+#[ignore = "takes minutes; `.ci/full` runs it"]
 fn walkthrough_writes_pairs_of_pictures() {
     draw("walkthrough", &["--two-targets"], 4);
 }
@@ -128,6 +129,7 @@ fn invisible() -> TempDir {
 }
 
 #[test]
+#[ignore = "takes minutes; `.ci/full` runs it"]
 fn every_example_writes_pictures_that_show_its_captures_and_change() {
     let invisible = invisible();
     for example in EXAMPLES {

@@ -410,6 +410,7 @@ fn invalid_sizes_and_rounds_are_refused() {
 }
 
 #[test]
+#[ignore = "takes minutes; `.ci/full` runs it by name"]
 fn with_training_scores_are_compared_after_training_and_pruning_may_take_rounds() {
     if !has_gpu() {
         return;

@@ -105,6 +105,7 @@ fn a_tile_of_70_000_splats_matches_the_cpu_reference() {
 }
 
 #[test]
+#[ignore = "takes minutes; `.ci/full` runs it by name"]
 fn a_tile_of_150_000_splats_matches_the_cpu_reference() {
     check(150_000);
 }

@@ -89,6 +89,7 @@ fn a_level_has_the_promised_psnr_in_other_views() {
 }
 
 #[test]
+#[ignore = "takes minutes; `.ci/full` runs it by name"]
 fn training_increases_the_psnr_of_a_level() {
     let Some(mut headless) = gpu::headless() else { return };
     let mut scene = clumps();
@@ -108,7 +109,7 @@ fn training_increases_the_psnr_of_a_level() {
 #[test]
 fn levels_below_the_minimum_psnr_are_dropped() {
     let Some(mut headless) = gpu::headless() else { return };
-    let strict = DetailSettings { min_psnr: 300.0, ..QUICK };
+    let strict = DetailSettings { min_psnr: 300.0, directions: 1, times: 1, ..QUICK };
     let made = detail(&mut headless, clumps(), &strict, &mut NoProgress).expect("levels can be measured");
     assert!(made.scene.levels.is_empty() && made.made[0].pixels.is_none(), "no level has a PSNR of 300 dB");
     assert_eq!(made.scene, clumps(), "the scene is unchanged");

@@ -198,6 +198,7 @@ fn the_last_point_of_a_compressed_run_is_measured_on_the_compressed_scene() {
 }
 
 #[test]
+#[ignore = "takes minutes; `.ci/full` runs it by name"]
 fn an_interrupted_and_resumed_run_has_the_result_of_an_uninterrupted_one() {
     let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new();

@@ -119,6 +119,7 @@ fn crowd_among_many(shown: usize, all: usize) -> RuntimeScene {
 /// If room for as many splats as the fullest bin has would be too large for all bins, bins are counted before they are
 /// filled.
 #[test]
+#[ignore = "takes minutes; `.ci/full` runs it by name"]
 fn bins_with_exact_room_match_the_reference_design() {
     let Some(mut headless) = gpu::headless() else { return };
     // The first guess of equal rooms is too large for all pictures. In the first, later frames have equal rooms; in the
