@@ -57,6 +57,12 @@ impl Colliders {
         once(&self.standing).chain(self.stretches.iter().map(|stretch| &stretch.mesh))
     }
 
+    /// Returns the numbers of points and of triangles of all meshes.
+    pub fn counts(&self) -> [usize; 2] {
+        self.meshes()
+            .fold([0, 0], |[points, triangles], mesh| [points + mesh.points.len(), triangles + mesh.triangles.len()])
+    }
+
     /// Returns them with the points that a package stores: 16 bits for each axis, over the box of all points. Each
     /// coordinate moves by half a step of 1/65535 of the box at most. Rounding again changes no bit.
     pub fn rounded(mut self) -> Self {
@@ -74,16 +80,13 @@ impl Colliders {
     /// # Errors
     /// A description of the first fault.
     pub fn check(&self) -> Result<(), &'static str> {
-        let (points, triangles) = self
-            .meshes()
-            .fold((0, 0), |(points, triangles), mesh| (points + mesh.points.len(), triangles + mesh.triangles.len()));
-        Self::check_counts(points, triangles)?;
+        Self::check_counts(self.counts())?;
         Self::check_times(self.stretches.iter().map(|stretch| [stretch.from, stretch.to]))?;
         self.meshes().try_for_each(ColliderMesh::check)
     }
 
     /// Checks the numbers of points and triangles of all meshes.
-    pub(crate) fn check_counts(points: usize, triangles: usize) -> Result<(), &'static str> {
+    pub(crate) fn check_counts([points, triangles]: [usize; 2]) -> Result<(), &'static str> {
         if points > Self::MOST_POINTS {
             return Err("more than 1048576 points of colliders: fewer cells, or fewer stretches a second");
         }

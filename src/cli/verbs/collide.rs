@@ -146,7 +146,7 @@ impl CollideVerb {
     /// Returns what has been found, for people. `stored` is the size of the colliders in the package, bytes.
     fn facts(&self, found: &Collided, stored: u64) -> Vec<(&'static str, String)> {
         let Collided { colliders, cell, solid: [standing, moving], .. } = found;
-        let (points, triangles) = sums(colliders.meshes());
+        let [points, triangles] = colliders.counts();
         let stretches = match colliders.stretches.as_slice() {
             [] => "none".to_owned(),
             all @ [first, ..] => {
@@ -172,7 +172,7 @@ impl CollideVerb {
     /// Returns what has been found, for programs.
     fn colliders_json(&self, found: &Collided) -> Value {
         let Collided { colliders, cell, solid: [standing, moving], .. } = found;
-        let (points, triangles) = sums(colliders.meshes());
+        let [points, triangles] = colliders.counts();
         let stretch = |ColliderStretch { from, to, mesh }: &ColliderStretch| json!({ "from": from, "to": to, "points": mesh.points.len(), "triangles": mesh.triangles.len() });
         let ColliderMesh { points: own_points, triangles: own_triangles } = &colliders.standing;
         json!({
@@ -187,11 +187,6 @@ impl CollideVerb {
             "stretches": colliders.stretches.iter().map(stretch).collect::<Vec<_>>(),
         })
     }
-}
-
-/// Returns the numbers of points and triangles of meshes together.
-fn sums<'a>(meshes: impl Iterator<Item = &'a ColliderMesh>) -> (usize, usize) {
-    meshes.fold((0, 0), |(points, triangles), mesh| (points + mesh.points.len(), triangles + mesh.triangles.len()))
 }
 
 /// Returns the box that was searched.

@@ -72,8 +72,7 @@ impl StoredColliders {
 
     /// Checks the numbers. Afterwards the words can be allocated, and every point on the grid is finite.
     pub(super) fn check(&self) -> Result<(), &'static str> {
-        let [points, triangles] = self.counts();
-        Colliders::check_counts(points, triangles)?;
+        Colliders::check_counts(self.counts())?;
         Colliders::check_times(self.stretches.iter().map(|stretch| [stretch.from, stretch.to]))?;
         let is_ascending = |(low, high): (&f32, &f32)| low.is_finite() && high.is_finite() && low <= high;
         match self.low.iter().zip(&self.high).all(is_ascending) {

@@ -143,10 +143,7 @@ fn combine(values: &mut [f32], others: &[f32], choose: fn(f32, f32) -> f32) {
 
 /// Checks that a capture may have meshes of this size.
 fn check_size(colliders: &Colliders) -> Result<(), CollideError> {
-    let points: usize = colliders.meshes().map(|mesh| mesh.points.len()).sum();
-    let triangles: usize = colliders.meshes().map(|mesh| mesh.triangles.len()).sum();
-    let is_small = points <= Colliders::MOST_POINTS && triangles <= Colliders::MOST_TRIANGLES;
-    if is_small { Ok(()) } else { Err(CollideError::TooLarge) }
+    Colliders::check_counts(colliders.counts()).map_err(|_| CollideError::TooLarge)
 }
 
 #[cfg(test)]
