@@ -195,6 +195,23 @@ fn colliders_are_replaced_and_the_same_settings_give_the_same_bytes() {
 }
 
 #[test]
+fn an_edit_says_that_colliders_stay_as_they_were() {
+    let folder = folder();
+    let scene = stage(&folder);
+    let [solid, left, edits] = ["solid.gs4d", "left.gs4d", "edits.ron"].map(|name| folder.path().join(name));
+    gs4d(&collide(&scene, &solid, &[])).text();
+    // The part of the stage on one side of the plane x = 0.
+    let half = "[remove_box(min: (0, -9, -9), max: (9, 9, 9))]";
+    fs::write(&edits, half).expect("the folder can be written to");
+    let note = "colliders stay as they were";
+    let run = gs4d(&arguments!["edit", &solid, &edits, "-o", &left]);
+    assert!(run.err.contains(note), "{}", run.err);
+    assert_eq!(read(&left).colliders, read(&solid).colliders, "they are as before");
+    let run = gs4d(&arguments!["edit", &scene, &edits, "-o", &left]);
+    assert!(!run.err.contains(note), "a capture without colliders: {}", run.err);
+}
+
+#[test]
 fn what_cannot_be_used_is_refused_and_nothing_is_written() {
     let folder = folder();
     let scene = stage(&folder);

@@ -85,6 +85,9 @@ impl EditVerb {
                 note(&format!("note: {}: edit {number}, {}, removes nothing", self.edits.display(), edit.name()));
             }
         }
+        if edited.kept < total && edited.scene.colliders.is_some() {
+            note("note: colliders stay as they were, also of what is removed: gs4d collide makes new ones");
+        }
         let after = self.save(&edited.scene)?;
         Ok(self.report(&list, &edited, total, before, after))
     }
