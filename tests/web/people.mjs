@@ -340,7 +340,7 @@ await visit('waiting', '', async ({ page, check, had, until }) => {
   results.figures = { 'first picture at 1280x720, ms': Math.round(first.milliseconds) };
   const early = (await had('time')).filter((one) => one.at < first.at);
   check('the clock stands until the first picture', (await had('playing')).length === 1 && early.every((one) => one.seconds === 0), early);
-  check('the first picture comes within 8 s', first.milliseconds <= 8000 * busy, first.milliseconds);
+  check('the first picture comes within 25 s', first.milliseconds <= 25_000 * busy, first.milliseconds);
   const tasks = () => page.evaluate(() => long.filter((one) => one.startTime > gs4d.times.compiled).map((one) => Math.round(one.duration)));
   let long = await tasks();
   // Another program may have taken the time: the page is loaded again.
