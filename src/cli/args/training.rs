@@ -30,9 +30,10 @@ pub(crate) struct TrainingArgs {
     /// training.
     #[arg(long, value_name = "WHAT", default_value = "random", value_parser = values::one_of(&BEHIND))]
     behind: Behind,
-    /// End after this number of evaluations without an improvement [default: make all steps].
-    #[arg(long, value_name = "N", value_parser = values::count(1_000_000))]
-    patience: Option<usize>,
+    /// End after this number of evaluations without an improvement; 0: make all steps [default: 5 in training from
+    /// opaque pictures, unless they are of several cameras that stand still; else 0].
+    #[arg(long, value_name = "N", value_parser = values::count_or_none(1_000_000))]
+    pub patience: Option<usize>,
     /// Seed of all random choices, such as the order of views and random backgrounds.
     #[arg(long, value_name = "N", default_value = "0")]
     pub seed: u64,
@@ -53,7 +54,7 @@ impl TrainingArgs {
             },
             exposure: self.exposure.unwrap_or(false),
             behind: self.behind,
-            patience: self.patience,
+            patience: self.patience.filter(|&patience| patience > 0),
             seed: self.seed,
             ..FineTuneSettings::default()
         }

@@ -111,9 +111,9 @@ pub(crate) struct Bake {
     #[arg(long, value_name = "MB", value_parser = values::positive)]
     target_size: Option<f32>,
     /// Number of rounds in which Gaussians are removed, with training and scoring between them, if the remaining
-    /// Gaussians are trained.
-    #[arg(long, value_name = "N", default_value = "4", conflicts_with = "no_fine_tune", value_parser = values::count(100))]
-    rounds: usize,
+    /// Gaussians are trained [default: 1 for pictures of several cameras that stand still, else 4].
+    #[arg(long, value_name = "N", conflicts_with = "no_fine_tune", value_parser = values::count(100))]
+    rounds: Option<usize>,
     /// Prune by this score; auto tries ours and the paper's, each with a short training if the remaining Gaussians are
     /// trained.
     #[arg(long, value_name = "SCORE", default_value = "energy-removal", value_parser = score_choice(false))]
@@ -134,9 +134,10 @@ pub(crate) struct Bake {
     /// images of all training views exist.
     #[arg(long)]
     no_fine_tune: bool,
-    /// Steps of fine-tuning; a third as many train the codebooks of color.
-    #[arg(long, value_name = "N", default_value = "5000", conflicts_with = "no_fine_tune", value_parser = values::count(100_000_000))]
-    steps: usize,
+    /// Steps of fine-tuning; a third as many train the codebooks of color [default: 500 for pictures of several cameras
+    /// that stand still, else 5000].
+    #[arg(long, value_name = "N", conflicts_with = "no_fine_tune", value_parser = values::count(100_000_000))]
+    steps: Option<usize>,
     /// Views of each of these steps.
     #[arg(long, value_name = "N", default_value = "2", conflicts_with = "no_fine_tune", value_parser = values::count(1000))]
     batch: usize,
@@ -258,8 +259,11 @@ impl Bake {
             true => Usual::read(&settings.data, &settings.splits, progress)?,
             false => Usual::PLAIN,
         };
+        settings.rounds = self.rounds.unwrap_or(usual.rounds);
         if let Some(tuning) = &mut settings.fine_tune {
             tuning.exposure = self.exposure.unwrap_or(usual.is_rig);
+            tuning.steps = self.steps.unwrap_or(usual.fine_tuning);
+            tuning.patience = usual.patience;
         }
         if let Some(path) = &self.jobs.plan {
             return self.plan(path, &settings, &usual, progress);
@@ -405,13 +409,13 @@ impl Bake {
             // A capture that is trained from pictures has its own background or environment map.
             background: if self.is_dataset() { None } else { self.checkpoint.background },
             goal: self.goal(),
-            rounds: self.rounds,
+            rounds: self.rounds.unwrap_or(Usual::PLAIN.rounds),
             score: self.variant,
             scoring: self.scoring.settings(),
             filter: self.filter,
             key_frames: values::key_frames(self.key_frames, self.every),
             fine_tune: (!self.no_fine_tune).then(|| FineTuneSettings {
-                steps: self.steps,
+                steps: self.steps.unwrap_or(Usual::PLAIN.fine_tuning),
                 batch: self.batch,
                 exposure: self.exposure.unwrap_or(false),
                 ..FineTuneSettings::default()

@@ -346,6 +346,7 @@ impl Train {
             similarity_share: self.similarity,
             terms: Terms { opacity, scale, ..shared.terms },
             exposure: self.training.exposure.unwrap_or(usual.is_rig),
+            patience: if self.training.patience.is_none() { usual.patience } else { shared.patience },
             standing: self.standing,
             coarse: self.coarse.then(Coarse::default),
             evaluate_every: self.evaluate_every,
@@ -377,7 +378,9 @@ mod tests {
     fn without_options_the_settings_are_the_usual_ones() {
         let command = Command::try_parse_from(["train", "--data", "d", "-o", "o.gs4d"]).expect("both paths are given");
         let splits = command.train.data.options(Validation::Auto);
-        for usual in [Usual::PLAIN, Usual { gaussians: 90_000, steps: 30_000, is_rig: true }] {
+        for usual in
+            [Usual::PLAIN, Usual { gaussians: 90_000, steps: 30_000, is_rig: true, patience: Some(7), ..Usual::PLAIN }]
+        {
             let settings = command.train.settings("d".into(), &usual);
             assert_eq!(
                 settings,

@@ -104,6 +104,18 @@ pub fn size(path: &Path, largest: UVec2) -> Result<UVec2, PictureError> {
     checked_size(path, &decoder, largest)
 }
 
+/// Returns whether a picture has a channel of transparency, from its header.
+///
+/// # Errors
+/// A file that cannot be read or is not a picture.
+pub fn has_alpha(path: &Path) -> Result<bool, PictureError> {
+    let (bytes, _) = read(path)?;
+    let decoder = reader(path, &bytes)?.into_decoder();
+    let decoder =
+        decoder.map_err(|reason| PictureError::Format { path: path.to_owned(), reason: exr::in_words(reason) })?;
+    Ok(decoder.color_type().has_alpha())
+}
+
 /// Decodes a picture. Linear light (EXR) becomes sRGB-encoded colors. The contents of the file determine its format,
 /// not its name.
 ///

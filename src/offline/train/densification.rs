@@ -59,7 +59,8 @@ pub struct Births {
     pub from: usize,
     /// The last such step. Default: seven tenths of all.
     pub until: usize,
-    /// Moments of a search, one after the other; the next search continues after them. Default: 3.
+    /// Least number of moments of a search, one after the other; the next search continues after them. There are more
+    /// if all searches together would not reach the last moment. Default: 3.
     pub moments: usize,
     /// Most births of a search, each of three Gaussians. Default: 200.
     pub most: usize,
@@ -152,6 +153,12 @@ impl Births {
     /// Returns whether there is a search after this number of steps.
     pub(crate) fn is_due_after(&self, step: usize) -> bool {
         step > 0 && step.is_multiple_of(self.every.max(1)) && (self.from..=self.until).contains(&step)
+    }
+
+    /// Returns the number of moments of each search, if there are so many in all.
+    pub(crate) fn moments_of(&self, all: usize) -> usize {
+        let searches = self.number(self.until) + 1;
+        self.moments.max(all.div_ceil(searches))
     }
 
     /// Returns the number of the search after this number of steps, from 0.

@@ -114,7 +114,8 @@ impl TrainSettings {
     /// Returns the usual settings for a dataset, with its usual choices.
     pub fn usual(data: PathBuf, splits: SplitOptions, usual: &Usual) -> Self {
         let start = StartSettings { gaussians: usual.gaussians, ..StartSettings::default() };
-        let tuning = FineTuneSettings { exposure: usual.is_rig, ..Self::tuning(usual.steps) };
+        let (exposure, patience) = (usual.is_rig, usual.patience);
+        let tuning = FineTuneSettings { exposure, patience, ..Self::tuning(usual.steps) };
         Self { data, splits, capture: CaptureSettings::default(), start, points: None, tuning, save_every: 5000 }
     }
 }

@@ -89,6 +89,11 @@ impl TrainedExposures {
         })
     }
 
+    /// Sets the exposures of all cameras.
+    pub(crate) fn write(&self, headless: &Headless, exposures: &[Exposure]) {
+        headless.context().queue.write_buffer(&self.values.values, 0, bytemuck::cast_slice(exposures));
+    }
+
     /// Creates the corrected picture of a view whose frame was recorded last, unless there is one for its buffers.
     fn fit(&mut self, work: &Workspace<'_>, view: &RecordedView<'_>) -> Result<(), GpuError> {
         if self.corrected.as_ref().is_none_or(|made| made.pixel_gradients != view.buffers.pixel_gradients) {

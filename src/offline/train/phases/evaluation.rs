@@ -32,3 +32,11 @@ pub(super) fn behind(background: Background) -> Vec3 {
         Background::None | Background::Environment => Vec3::ZERO,
     }
 }
+
+/// Returns the color behind the scene, which no exposure changes; `None` if an environment map is there.
+pub(super) fn color_behind(background: Background) -> Option<Vec3> {
+    match background {
+        Background::Environment => None,
+        Background::Color(_) | Background::None => Some(behind(background)),
+    }
+}

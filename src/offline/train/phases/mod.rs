@@ -8,6 +8,7 @@
 //! | `steps` | the first phase: steps, evaluations, states |
 //! | `codebook_phase` | the last phase: codebooks of color, compression |
 //! | `session` | what both phases use: one step, one evaluation, the scene of a run |
+//! | `first_exposures` | the exposures before the first step of fine-tuning |
 //! | `batch` | the views and images of a step |
 //! | `evaluation` | the PSNR on the validation views |
 //! | `repair` | births where cameras see an error, floaters |
@@ -15,6 +16,7 @@
 mod batch;
 mod codebook_phase;
 mod evaluation;
+mod first_exposures;
 mod repair;
 mod session;
 mod steps;

@@ -6,7 +6,7 @@
 //! follows from the number of the step and from the parameters, so that a resumed run ends as one that was not
 //! interrupted. The rules are in the [CPU references](crate::offline::train::reference).
 
-use super::evaluation::behind;
+use super::evaluation::{behind, color_behind};
 use super::session::Session;
 use crate::offline::dataset::selection::camera_numbers;
 use crate::offline::dataset::{DatasetError, TrainingView};
@@ -19,7 +19,7 @@ use crate::offline::train::reference::floaters::{HIDDEN, floaters};
 use crate::offline::train::reference::triangulation::{Sight, Sighted, triangulate};
 use crate::offline::train::schedule::relocation_seed;
 use crate::offline::train::start::region::Region;
-use crate::view::{Background, Picture, View};
+use crate::view::{Picture, View};
 use glam::Vec3;
 use rayon::prelude::*;
 use std::collections::HashSet;
@@ -112,7 +112,7 @@ impl Repairs {
     fn bear(&mut self, session: &mut Session<'_>, asked: &Births, steps: usize) -> Result<(), TrainError> {
         let exposures = session.trainer.exposures()?;
         let mut found = Vec::new();
-        for moment in self.moments.of_repair(asked.number(steps), asked.moments) {
+        for moment in self.moments.of_repair(asked.number(steps), asked.moments_of(self.moments.own.len())) {
             found.push((moment.time, self.missing(session, moment, &exposures)?));
         }
         let births = births(&found, self.moments.distance, asked.most);
@@ -160,14 +160,6 @@ impl Repairs {
             None => (Vec3::ZERO, f32::INFINITY),
         };
         Ok(triangulate(&sights, center, reach))
-    }
-}
-
-/// Returns the color behind the scene, which no exposure changes; `None` if an environment map is there.
-fn color_behind(background: Background) -> Option<Vec3> {
-    match background {
-        Background::Environment => None,
-        Background::Color(_) | Background::None => Some(behind(background)),
     }
 }
 

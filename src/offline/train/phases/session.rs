@@ -4,6 +4,7 @@
 
 use super::batch::Batches;
 use super::evaluation::{behind, psnr};
+use super::first_exposures::first_exposures;
 use crate::offline::dataset::selection::even_subset;
 use crate::offline::filter::temporal_filter::filter_of_views;
 use crate::offline::score::GpuEngine;
@@ -65,6 +66,10 @@ impl<'a> Session<'a> {
         let cameras = if settings.exposure { images.cameras() } else { Vec::new() };
         let batch = settings.batch.min(images.len());
         trainer.prepare(&Request { cameras: &cameras, batch, ..Request::of(settings) })?;
+        if settings.exposure && settings.growth.is_none() {
+            let exposures = first_exposures(&mut trainer, images, &cameras, background)?;
+            trainer.set_exposures(&exposures);
+        }
         let batches = Batches::new(&trainer, images, settings, background)?;
         for index in even_subset(&images.views, VIEWS_OF_ROOM) {
             trainer.make_room(&images.shots[index].view)?;

@@ -11,10 +11,10 @@
 //!
 //! so that a background color does not change: it is put behind the images after they are taken. An environment map
 //! is part of the scene, and `o` is then 1. `M` and `b` are the columns of a matrix of three rows (3DGS has the same,
-//! for opaque pictures).
+//! for opaque pictures). Where a scene exists before the first step, exposures begin at their least squares ([`Fit`]).
 
 use crate::view::{Frame, Picture};
-use glam::{DVec3, Vec3};
+use glam::{DMat4, DVec3, DVec4, Vec3};
 
 /// An exposure: for red, green and blue the factors on red, green and blue, and the offset of an opaque pixel.
 pub type Exposure = [[f32; 4]; 3];
@@ -25,6 +25,44 @@ pub const IDENTITY: Exposure = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0
 /// Weight, in the loss of a view, of the sum of the squared differences between the exposure of its camera and
 /// [`IDENTITY`]: so weak that a difference which the images show costs little.
 pub const PULL: f32 = 1e-3;
+
+/// Weight, in the mean squared error of a pixel, of the squared differences between a fitted exposure and
+/// [`IDENTITY`]: it decides for colors that a camera does not show.
+const FIT_PULL: f64 = 1e-4;
+
+/// The exposure that fits the drawn frames of a camera to its images: that of the least squared error.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Fit {
+    /// Sums over pixels of the products of the color and the opacity of the scene.
+    own: DMat4,
+    /// Sums of their products with red, green and blue of the images.
+    image: [DVec4; 3],
+    pixels: f64,
+}
+
+impl Fit {
+    /// Adds a drawn frame and the image of the same view over the same background. `background` is as in [`exposed`].
+    pub fn add(&mut self, frame: &Frame, image: &Picture, background: Option<Vec3>) {
+        let drawn = frame.picture.pixels.iter().zip(&frame.transmittance);
+        for ((color, transmittance), image) in drawn.zip(&image.pixels) {
+            let (own, opacity, behind) = of_scene(*color, *transmittance, background);
+            let (own, image) = (own.extend(opacity), (image.as_dvec3() - behind).to_array());
+            self.own += DMat4::from_cols(own * own.x, own * own.y, own * own.z, own * own.w);
+            self.image = std::array::from_fn(|channel| self.image[channel] + own * image[channel]);
+            self.pixels += 1.0;
+        }
+    }
+
+    /// Returns the exposure; [`IDENTITY`] without pixels.
+    pub fn exposure(&self) -> Exposure {
+        let pull = FIT_PULL * self.pixels.max(1.0);
+        let inverse = (self.own + DMat4::from_diagonal(DVec4::splat(pull))).inverse();
+        std::array::from_fn(|channel| {
+            let identity = DVec4::from_array(IDENTITY[channel].map(f64::from));
+            (inverse * (self.image[channel] + pull * identity)).as_vec4().to_array()
+        })
+    }
+}
 
 /// The gradients of a loss.
 #[derive(Debug, Clone, PartialEq)]
@@ -169,6 +207,28 @@ mod tests {
         let row = |row: [f32; 4]| row[0] * 0.25 + row[1] * 0.5 + row[2] + row[3];
         let expected = Vec3::from(OTHER.map(row));
         assert!(surrounded.distance(expected) < 1e-6, "an environment map is exposed: {surrounded}, not {expected}");
+    }
+
+    #[test]
+    fn a_fit_finds_the_exposure_of_images() {
+        let (black, picture) = (Picture { size: SIZE, pixels: vec![Vec3::ZERO; PIXELS] }, frame());
+        for background in [Some(Vec3::new(0.3, 0.6, 0.1)), None] {
+            let mut fit = Fit::default();
+            assert_eq!(fit.exposure(), IDENTITY, "without pixels");
+            fit.add(&picture, &exposed(&picture, &OTHER, background), background);
+            let found = fit.exposure();
+            let pairs = found.as_flattened().iter().zip(OTHER.as_flattened());
+            let error = pairs.map(|(found, own)| (found - own).abs()).fold(0.0, f32::max);
+            assert!(error < 0.01, "{found:?} over {background:?}, not {OTHER:?}");
+        }
+        // Without any green the factors on green stay as they are.
+        let mut red = picture;
+        red.picture.pixels.iter_mut().for_each(|color| (color.y, color.z) = (0.0, 0.0));
+        red.transmittance.fill(0.0);
+        let mut fit = Fit::default();
+        fit.add(&red, &black, Some(Vec3::ZERO));
+        let [own, green, _] = fit.exposure();
+        assert!(own[0].abs() < 0.01 && (green[1] - 1.0).abs() < 1e-3, "{own:?}, {green:?}");
     }
 
     #[test]

@@ -37,6 +37,13 @@ impl Trainer<'_> {
         self.read_exposures(Quantity::Values)
     }
 
+    /// Sets the exposures of all cameras, if they are trained.
+    pub(crate) fn set_exposures(&self, exposures: &[Exposure]) {
+        if let Some(trained) = self.parts.get::<TrainedExposures>() {
+            trained.write(self.work.headless, exposures);
+        }
+    }
+
     /// Returns the gradients with respect to the exposures, accumulated since the last step.
     ///
     /// # Errors
