@@ -3,7 +3,8 @@
 //! to debug views.
 //!
 //! ```text
-//! cargo run --release --features viewer --example play -- [CAPTURE] [--headless FOLDER] [--frames N]
+//! cargo run --release --features viewer --example play -- \
+//!     [CAPTURE] [--edits FILE] [--headless FOLDER] [--frames N]
 //! ```
 //!
 //! * drag with the left button: orbit; wheel: nearer and farther
@@ -16,6 +17,11 @@
 //! A capture whose file changes is loaded again, so that the output of a running `gs4d train` is shown as it becomes
 //! better.
 //!
+//! With `--edits FILE` it shows the capture without what a list of edits removes, as `gs4d edit` writes it. The list is
+//! applied again whenever its file is saved: to undo an edit, remove its line. A list with an error changes nothing
+//! that is shown; the log and the panel name the line. `remove_floaters` is such an error, because it needs the
+//! training cameras.
+//!
 //! With `--headless FOLDER`, or without a display, it writes N (8) pictures to FOLDER (`out`) instead, without the
 //! panel.
 
@@ -24,8 +30,12 @@ mod common;
 mod controls;
 #[path = "play/drop.rs"]
 mod drop;
+#[path = "play/edits.rs"]
+mod edits;
 #[path = "play/live.rs"]
 mod live;
+#[path = "play/stamp.rs"]
+mod stamp;
 
 use bevy::asset::UnapprovedPathMode;
 use bevy::core_pipeline::tonemapping::Tonemapping;
@@ -42,8 +52,10 @@ use bevy_gs4d::playback::Playback;
 use bevy_gs4d::testing::{self, Offscreen};
 use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugins};
 use common::Orbit;
+use common::arguments::value;
 use controls::{follow, mouse};
 use drop::drop_file;
+use edits::{Edits, apply_edits, look_at_edits};
 use live::reload_changed;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -60,16 +72,27 @@ struct Marker;
 
 /// Maximum motion of the mouse during a click, in pixels.
 const CLICK: f32 = 4.0;
-/// Time between two looks at the file of the capture.
+/// Time between two looks at the file of the capture, and at that of the edits.
 const LOOK_AGAIN: Duration = Duration::from_millis(500);
 
 fn main() -> Result {
-    let arguments = controls::arguments("island.gs4d")?;
+    let mut list = None;
+    let arguments = controls::arguments("island.gs4d", |option, values| {
+        if option == "--edits" {
+            list = Some(PathBuf::from(value(option, "a file", values)?));
+        }
+        Ok(option == "--edits")
+    })?;
     let capture = Capture(common::asset_path(&arguments.file));
+    let edits = list.map(Edits::of);
     match arguments.headless {
         Some(folder) => {
             let mut app = testing::app(UVec2::new(960, 540));
             scene(&mut app, capture);
+            if let Some(edits) = edits {
+                app.insert_resource(edits).add_systems(Update, apply_edits);
+                wait_for_edits(&mut app)?;
+            }
             common::save_pictures(&mut app, arguments.frames, Duration::from_secs_f64(1.0 / 30.0), &folder)
         }
         None => {
@@ -81,8 +104,28 @@ fn main() -> Result {
             let keys = keys.run_if(not(egui_wants_any_keyboard_input));
             let mouse = (mouse, pick).run_if(not(egui_wants_any_pointer_input));
             let reload = reload_changed.run_if(on_real_timer(LOOK_AGAIN));
+            if let Some(edits) = edits {
+                let look = look_at_edits.run_if(on_real_timer(LOOK_AGAIN));
+                app.insert_resource(edits).add_systems(Update, (look, apply_edits).chain());
+            }
             app.add_plugins(InspectorPlugin).add_systems(Update, (drop_file, keys, mouse, reload).before(follow)).run();
             Ok(())
+        }
+    }
+}
+
+/// Runs the app until its capture is shown with its edits.
+///
+/// # Errors
+/// A capture that cannot be loaded; a list of edits that cannot be read or applied.
+fn wait_for_edits(app: &mut App) -> Result {
+    loop {
+        testing::step(app, Duration::ZERO)?;
+        let edits = app.world().resource::<Edits>();
+        match edits.fault() {
+            Some(fault) => return Err(fault.into()),
+            None if edits.is_waiting() => {}
+            None => return Ok(()),
         }
     }
 }

@@ -58,7 +58,7 @@ const FPS: f32 = 30.0;
 const MOST_MARKS: u32 = 1000;
 
 fn main() -> Result {
-    let arguments = controls::arguments("demo.timeline.ron")?;
+    let arguments = controls::arguments("demo.timeline.ron", |_, _| Ok(false))?;
     let show = Show(common::asset_path(&arguments.file));
     match arguments.headless {
         Some(folder) => {

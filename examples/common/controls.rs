@@ -7,12 +7,16 @@ use crate::common::arguments::{Arguments, parse};
 use bevy::input::mouse::{AccumulatedMouseMotion, AccumulatedMouseScroll, MouseScrollUnit};
 use bevy::prelude::*;
 
-/// Reads `[FILE] [--headless FOLDER] [--frames N]`. Default: a window, or eight pictures.
+/// Reads `[FILE] [--headless FOLDER] [--frames N]`, and with `more` the options of one example. Default: a window, or
+/// eight pictures.
 ///
 /// # Errors
 /// Those of [`parse`].
-pub fn arguments(file: &str) -> Result<Arguments> {
-    parse(Arguments { file: file.into(), headless: None, frames: 8 }, |_, _| Ok(false))
+pub fn arguments(
+    file: &str,
+    more: impl FnMut(&str, &mut dyn Iterator<Item = String>) -> Result<bool>,
+) -> Result<Arguments> {
+    parse(Arguments { file: file.into(), headless: None, frames: 8 }, more)
 }
 
 /// Moves cameras to their positions on the orbit.

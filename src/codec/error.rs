@@ -7,6 +7,7 @@ use super::import::ImportError;
 use super::options::InvalidOption;
 use super::package::PackageError;
 use crate::gaussian::InvalidGaussian;
+use crate::scene::edit::EditListError;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -48,6 +49,9 @@ pub enum CodecErrorKind {
     /// A Gaussian that cannot be drawn.
     #[error(transparent)]
     Gaussian(#[from] InvalidGaussian),
+    /// A file that is not a list of edits.
+    #[error(transparent)]
+    Edits(#[from] EditListError),
 }
 
 impl CodecErrorKind {

@@ -4,10 +4,11 @@
 //! `format` is the table of formats: [`checkpoint`] reads the files of the 4DGS trainer (`.pth`), of gsplat and of
 //! nerfstudio, [`package`] reads and writes the format of this crate (`.gs4d`), `import` reads those of other makes.
 //! `found` finds the capture of a file, which may be inside of gzip or of a zip archive; `looks` says what a file is
-//! that is no capture.
+//! that is no capture. `edits` reads a list of edits.
 
 pub(crate) mod budget;
 pub mod checkpoint;
+mod edits;
 mod error;
 pub(crate) mod export;
 pub(crate) mod format;
@@ -26,6 +27,7 @@ mod start;
 pub(crate) mod text;
 mod zstd_frames;
 
+pub use edits::read_edits;
 pub use error::{CodecError, CodecErrorKind};
 pub use import::ImportError;
 pub use loading::Loading;

@@ -22,7 +22,7 @@
 //! | [`segments`] | captures of stretches of time become one, and one becomes chunks |
 //! | [`mod@compress`] | the Gaussians are packed, and their colors are coded by codebooks |
 //! | [`mod@train`] | the Gaussians are trained: from pictures alone, or to compensate for removed Gaussians |
-//! | [`edit`] | a list of edits is read, and cameras tell floaters from what stands there |
+//! | [`edit`] | cameras tell floaters from what stands there, for edits |
 //! | [`sockets`] | named points follow the Gaussians around them |
 //! | [`mod@collide`] | the solid parts become closed meshes, for the physics of games |
 //! | [`mod@footage`] | footage of several cameras becomes a dataset, with a verdict |

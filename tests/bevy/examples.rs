@@ -185,6 +185,14 @@ fn errors_name_wrong_arguments() {
 }
 
 #[test]
+fn the_option_edits_of_play_needs_a_file() {
+    let output = run("play", &["--edits"]);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(!output.status.success(), "play fails without the file");
+    assert!(said.contains("--edits needs a file"), "play says what is missing:\n{said}");
+}
+
+#[test]
 fn the_example_film_refuses_wrong_arguments_and_has_help() {
     let used = tempfile::tempdir().expect("a temporary folder");
     std::fs::write(used.path().join("notes.txt"), "mine").expect("the folder can be written to");

@@ -10,6 +10,7 @@ mod assets;
 mod colliders;
 mod composition;
 mod detail;
+mod edited_file;
 mod examples;
 mod failures;
 mod film;

@@ -212,6 +212,23 @@ fn an_edit_says_that_colliders_stay_as_they_were() {
 }
 
 #[test]
+fn pruning_says_that_colliders_stay_as_they_were() {
+    let folder = folder();
+    let scene = stage(&folder);
+    let [solid, left, scores] = ["solid.gs4d", "left.gs4d", "scores.f32"].map(|name| folder.path().join(name));
+    gs4d(&collide(&scene, &solid, &[])).text();
+    let bytes: Vec<u8> = (0..read(&scene).len()).flat_map(|index| (index as f32).to_le_bytes()).collect();
+    fs::write(&scores, bytes).expect("the folder can be written to");
+    for (from, ratio, is_told) in [(&solid, "0.5", true), (&solid, "0", false), (&scene, "0.5", false)] {
+        let run = gs4d(&arguments!["prune", from, "--scores", &scores, "--ratio", ratio, "-o", &left]);
+        assert_eq!(run.code, Some(0), "{} without {ratio}: {}", from.display(), run.err);
+        let said = run.err.contains("colliders stay as they were");
+        assert_eq!(said, is_told, "{} without {ratio}: {}", from.display(), run.err);
+        assert_eq!(read(&left).colliders, read(from).colliders, "they are as before");
+    }
+}
+
+#[test]
 fn what_cannot_be_used_is_refused_and_nothing_is_written() {
     let folder = folder();
     let scene = stage(&folder);

@@ -3,6 +3,7 @@
 //! In: results, failures, progress and signals. Out: one report on standard output, as text or JSON; progress, notes
 //! and errors on standard error.
 
+pub(super) mod colliders;
 pub(super) mod curve;
 pub(super) mod exposures;
 pub(super) mod failure;

@@ -4,12 +4,14 @@
 //! Gaussians that remain, bit for bit; a report of how many each edit has removed.
 
 use crate::cli::args::{CheckpointArgs, DataArgs, Given, Need, file_size};
+use crate::cli::output::colliders::note_colliders;
 use crate::cli::output::failure::Failure;
 use crate::cli::output::note::note;
 use crate::cli::output::progress::Bars;
 use crate::cli::output::report::Report;
 use crate::cli::output::table::{Table, bytes, lines};
-use crate::offline::edit::{read_edits, seen_by};
+use crate::codec::read_edits;
+use crate::offline::edit::seen_by;
 use crate::offline::store::outputs::Files;
 use crate::offline::work::{save, write_settings};
 use crate::scene::GaussianScene;
@@ -85,9 +87,7 @@ impl EditVerb {
                 note(&format!("note: {}: edit {number}, {}, removes nothing", self.edits.display(), edit.name()));
             }
         }
-        if edited.kept < total && edited.scene.colliders.is_some() {
-            note("note: colliders stay as they were, also of what is removed: gs4d collide makes new ones");
-        }
+        note_colliders(&edited.scene, edited.kept, total);
         let after = self.save(&edited.scene)?;
         Ok(self.report(&list, &edited, total, before, after))
     }

@@ -8,6 +8,7 @@ use crate::cli::args::{
     CheckpointArgs, DataArgs, EngineArgs, Given, Need, PackageArgs, ScoringArgs, ValidationArgs, file_size,
     score_choice, values,
 };
+use crate::cli::output::colliders::note_colliders;
 use crate::cli::output::failure::Failure;
 use crate::cli::output::progress::Bars;
 use crate::cli::output::report::Report;
@@ -83,6 +84,7 @@ impl Prune {
         let scene = self.checkpoint.load_to_change(&self.input)?;
         let total = scene.len();
         let Pruned { scene, outcome, search } = self.prune(scene)?;
+        note_colliders(&scene, outcome.kept, total);
         let after = self.package.save(&scene)?;
         let (kept, score) = (outcome.kept, &outcome.score);
         let mut text = String::new();

@@ -1,17 +1,11 @@
-//! Edits of a capture: from their file, and with what its training cameras see.
+//! Edits of a capture that ask what its training cameras see.
 //!
-//! In: a file with an [`EditList`](crate::scene::edit::EditList), the views of a dataset. Out: the list; how many
-//! cameras see each Gaussian, for the edits that ask for it. [`scene::edit`](crate::scene::edit) applies the list.
-//!
-//! | file | subject |
-//! |---|---|
-//! | `read` | a list from its file |
-//! | `cameras` | what cameras see of each Gaussian |
+//! In: a capture, the views of a dataset. Out: how many cameras see each Gaussian, for the edits that ask for it.
+//! [`codec::read_edits`](crate::codec::read_edits) reads a list of edits, and [`scene::edit`](crate::scene::edit) applies
+//! it.
 
 mod cameras;
 mod error;
-mod read;
 
 pub use cameras::seen_by;
 pub use error::SeenError;
-pub use read::read_edits;

@@ -34,7 +34,7 @@ mod state;
 mod systems;
 mod uploads;
 
-pub use super::component::{GaussianCapture, KeyFrames};
+pub use super::component::{CaptureEditError, GaussianCapture, KeyFrames};
 pub use failure::CaptureFailure;
 pub use loader::{CaptureLoadError, CaptureLoader, CaptureLoaderSettings};
 pub(crate) use messages::send;

@@ -2,9 +2,9 @@
 //!
 //! In: a path. Out: its [`EditList`]; an error that names the file, the line and the remedy.
 
-use crate::codec::input::open_regular;
-use crate::codec::text::without_mark;
-use crate::offline::work::FileError;
+use super::error::CodecError;
+use super::input::open_regular;
+use super::text::without_mark;
 use crate::scene::edit::EditList;
 use crate::scene::edit::list::MOST_BYTES;
 use std::io::{self, Read};
@@ -14,13 +14,13 @@ use std::path::Path;
 ///
 /// # Errors
 /// A file that cannot be read or is not a list of edits.
-pub fn read_edits(path: &Path) -> Result<EditList, FileError> {
-    let at = |error: io::Error| FileError::at(path, error);
+pub fn read_edits(path: &Path) -> Result<EditList, CodecError> {
+    let at = |error: io::Error| CodecError::at(path, error);
     let file = open_regular(path).map_err(at)?;
     let mut text = Vec::new();
     // One byte more than the most with a mark: a longer file is refused without being read.
     file.take(MOST_BYTES as u64 + 4).read_to_end(&mut text).map_err(at)?;
-    EditList::parse(without_mark(&text)).map_err(|error| FileError::at(path, error))
+    EditList::parse(without_mark(&text)).map_err(|error| CodecError::at(path, error))
 }
 
 #[cfg(test)]
