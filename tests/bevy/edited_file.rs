@@ -6,9 +6,8 @@
 
 #[path = "../../examples/play/edits.rs"]
 mod edits;
-#[path = "../../examples/play/stamp.rs"]
-mod stamp;
 
+use crate::replaced_file::stamp;
 use crate::support::waiting::wait_until;
 use bevy::asset::UnapprovedPathMode;
 use bevy::prelude::*;

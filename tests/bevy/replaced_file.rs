@@ -6,7 +6,7 @@
 #[path = "../../examples/play/live.rs"]
 mod live;
 #[path = "../../examples/play/stamp.rs"]
-mod stamp;
+pub(crate) mod stamp;
 
 use crate::support::event_log::{record, take_events};
 use crate::support::waiting::wait_until;

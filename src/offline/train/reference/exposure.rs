@@ -31,13 +31,19 @@ pub const PULL: f32 = 1e-3;
 const FIT_PULL: f64 = 1e-4;
 
 /// The exposure that fits the drawn frames of a camera to its images: that of the least squared error.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 pub struct Fit {
     /// Sums over pixels of the products of the color and the opacity of the scene.
     own: DMat4,
     /// Sums of their products with red, green and blue of the images.
     image: [DVec4; 3],
     pixels: f64,
+}
+
+impl Default for Fit {
+    fn default() -> Self {
+        Self { own: DMat4::ZERO, image: [DVec4::ZERO; 3], pixels: 0.0 }
+    }
 }
 
 impl Fit {
