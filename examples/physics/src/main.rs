@@ -7,8 +7,8 @@
 //! CAPTURE is a package with colliders, which `gs4d collide` makes. In the first ten seconds, N (200) balls fall from
 //! above its bounds, each where something standing is below it. With `--headless` there is no window: twenty seconds
 //! pass in fixed steps, then one line counts the balls that fell through what stands, those whose center is in what is
-//! solid by more than their radius, and those that rolled over an edge. The exit code is 1 if there are any of the
-//! first two.
+//! solid by more than their radius, and those that rolled over an edge, and another compares the times of frames with
+//! and without another mesh. The exit code is 1 if there are any balls of the first two kinds.
 //!
 //! `collide` is the code that a game needs: all meshes are prepared once, and exchanged when the capture says so.
 
@@ -27,13 +27,15 @@ use bevy_gs4d::testing;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 const USAGE: &str = "physics CAPTURE [--balls N] [--headless]";
 /// Time that passes without a window.
 const RUN: Duration = Duration::from_secs(20);
-/// Time in which the balls are dropped.
+/// Time in which the balls are dropped; frames are timed in the rest.
 const DROPPING: Duration = Duration::from_secs(10);
+/// A frame.
+const FRAME: Duration = Duration::from_nanos(16_666_667);
 
 #[derive(Resource)]
 struct Settings {
@@ -49,6 +51,10 @@ struct Prepared {
     standing: Option<Collider>,
     moving: Vec<Option<Collider>>,
 }
+
+/// Whether the present frame has exchanged a mesh.
+#[derive(Resource, Default)]
+struct Exchanged(bool);
 
 /// Where balls are dropped, in the world.
 #[derive(Resource)]
@@ -94,6 +100,7 @@ fn main() -> Result<ExitCode> {
         .insert_resource(settings)
         .init_resource::<Prepared>()
         .init_resource::<Count>()
+        .init_resource::<Exchanged>()
         .add_systems(Startup, place)
         .add_systems(
             Update,
@@ -143,8 +150,10 @@ fn collide(
     mut changes: MessageReader<CaptureColliderChanged>,
     colliders: Query<(&CaptureCollider, &ColliderState)>,
     mut prepared: ResMut<Prepared>,
+    mut exchanged: ResMut<Exchanged>,
 ) {
     for change in changes.read() {
+        exchanged.0 = true;
         let Ok((part, state)) = colliders.get(change.entity) else { continue };
         if let Some(all) = state.colliders() {
             prepared.prepare(all);
@@ -277,7 +286,8 @@ fn collect(
 
 /// Runs the app without a window, and prints what became of the balls.
 fn judge(app: &mut App) -> Result<ExitCode> {
-    testing::step(app, RUN)?;
+    testing::step(app, DROPPING)?;
+    let [usual, exchanging, after] = times_of_frames(app)?.map(median);
     if !app.world().contains_resource::<Arena>() {
         return Err("the capture has no standing mesh on which balls could fall: `gs4d collide` makes colliders".into());
     }
@@ -288,7 +298,40 @@ fn judge(app: &mut App) -> Result<ExitCode> {
          {over_an_edge} rolled over an edge",
         RUN.as_secs()
     );
+    println!(
+        "frames with physics, medians: {usual:.3} ms, {exchanging:.3} ms if a mesh is exchanged, {after:.3} ms after that"
+    );
     Ok(ExitCode::from(u8::from(through + inside > 0)))
+}
+
+/// Runs the rest of the time, and returns the milliseconds of the frames without another mesh, of those with one, and
+/// of those that follow these.
+fn times_of_frames(app: &mut App) -> Result<[Vec<f64>; 3]> {
+    let mut times = [const { Vec::new() }; 3];
+    let mut follows = false;
+    for _ in 0..(RUN - DROPPING).as_nanos() / FRAME.as_nanos() {
+        app.world_mut().resource_mut::<Exchanged>().0 = false;
+        let begun = Instant::now();
+        testing::step(app, FRAME)?;
+        let milliseconds = 1e3 * begun.elapsed().as_secs_f64();
+        let exchanges = app.world().resource::<Exchanged>().0;
+        times[if exchanges {
+            1
+        } else if follows {
+            2
+        } else {
+            0
+        }]
+        .push(milliseconds);
+        follows = exchanges;
+    }
+    Ok(times)
+}
+
+/// Returns the median; 0 of none.
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// Returns the number of balls whose center is in something solid by more than their radius.
