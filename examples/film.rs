@@ -9,6 +9,9 @@
 //!
 //! The script films, trains, bakes and evaluates.
 //!
+//! `points.json` in the folder has the tracks of ten points of the scene, with which `gs4d socket --points` compares
+//! sockets.
+//!
 //! Defaults: the folder `dataset`, 32 cameras on a hemisphere, each with its own offset of the shutter, 96 times over
 //! four seconds, pictures of 800x800. Every eighth camera is for the test, another eighth for validation. `--rig grid`
 //! is a rig as of the dataset N3V: 21 cameras in three rows before the scene, which film at the same moments, the one

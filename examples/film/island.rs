@@ -1,13 +1,14 @@
 //! The scene of the example `film`: a floating island with a cherry tree that sheds petals, a gate with paper lanterns,
 //! carp streamers in the wind and a fire.
 //!
-//! In: a time in seconds. Out: the pose and shape of everything that moves. The scene is a loop of [`SECONDS`] and
-//! depends on the time alone.
+//! In: a time in seconds. Out: the pose and shape of everything that moves, and ten named points on it. The scene is a
+//! loop of [`SECONDS`] and depends on the time alone.
 
 use bevy::asset::RenderAssetUsages;
 use bevy::camera::visibility::NoFrustumCulling;
 use bevy::mesh::{Indices, PrimitiveTopology};
 use bevy::prelude::*;
+use bevy_gs4d::testing::FilmedPoint;
 use std::f32::consts::TAU;
 
 /// Length of the loop.
@@ -26,6 +27,8 @@ const POINTS: usize = 14;
 const FIRE: Vec3 = Vec3::new(0.52, 0.03, 0.42);
 const POLE: Vec3 = Vec3::new(0.62, 1.02, -0.42);
 const CROWN: Vec3 = Vec3::new(-0.48, 0.78, -0.18);
+/// Height below which a petal is among the grass.
+const GRASS: f32 = 0.05;
 
 /// A thing that moves.
 #[derive(Component, Clone, Copy)]
@@ -42,6 +45,14 @@ enum Moving {
         length: f32,
     },
     FireLight,
+    /// A point on this petal.
+    OnPetal(usize),
+    /// A point on the streamer with these measures: one of its points.
+    OnStreamer {
+        below: f32,
+        length: f32,
+        point: usize,
+    },
 }
 
 /// Spawns the scene.
@@ -73,7 +84,11 @@ pub fn spawn(
         (Vec3::new(0.78, 0.055, 0.07), 0.63, &red),
     ] {
         let beam = meshes.add(Cuboid::from_size(size));
-        commands.spawn((Mesh3d(beam), MeshMaterial3d(material.clone()), Transform::from_xyz(0.2, y, -0.02)));
+        let pose = Transform::from_xyz(0.2, y, -0.02);
+        let mut beam = commands.spawn((Mesh3d(beam), MeshMaterial3d(material.clone()), pose));
+        if size.x > 1.0 {
+            beam.with_child(named("gate", Vec3::new(0.4, size.y / 2.0, 0.0)));
+        }
     }
     // The tree.
     let limbs = [
@@ -91,19 +106,32 @@ pub fn spawn(
     for index in 0..13 {
         let direction = Vec3::new(chance(index, 1) - 0.5, 0.62 * (chance(index, 2) - 0.45), chance(index, 3) - 0.5);
         let place = CROWN + 0.78 * direction;
-        let ball = meshes.add(blossoms(0.15 + 0.09 * chance(index, 4), index));
+        let ball = blossoms(0.15 + 0.09 * chance(index, 4), index);
+        let top = highest(&ball);
         let material = MeshMaterial3d(petals[index % 3].clone());
-        commands.spawn((Moving::Blossoms(place), Mesh3d(ball), material, Transform::from_translation(place)));
+        let pose = Transform::from_translation(place);
+        let mut ball = commands.spawn((Moving::Blossoms(place), Mesh3d(meshes.add(ball)), material, pose));
+        // No other ball is above this one.
+        if index == 12 {
+            ball.with_child(named("blossoms", top));
+        }
     }
     let petal = meshes.add(Sphere::new(0.02).mesh().ico(1).unwrap_or_else(|_| Sphere::new(0.02).into()));
     for index in 0..PETALS {
         let material = MeshMaterial3d(petals[index % 3].clone());
-        commands.spawn((Moving::Petal(index), Mesh3d(petal.clone()), material, Transform::default()));
+        let mut petal = commands.spawn((Moving::Petal(index), Mesh3d(petal.clone()), material, Transform::default()));
+        // Two large ones that are in the air in the middle of the loop.
+        let name = match index {
+            3 => "early petal",
+            11 => "late petal",
+            _ => continue,
+        };
+        petal.with_child((Moving::OnPetal(index), named(name, 0.02 * Vec3::Y)));
     }
     // Lanterns hang from the lower beam.
     let glow = materials.add(StandardMaterial { base_color: Color::srgb(1.0, 0.8, 0.45), unlit: true, ..default() });
     let lantern = meshes.add(Sphere::new(0.075));
-    for x in [0.06, 0.34] {
+    for (name, side, x) in [("left lantern", Vec3::Z, 0.06), ("right lantern", Vec3::X, 0.34)] {
         let hook = Vec3::new(x, 0.6, -0.02);
         commands
             .spawn((Moving::Lantern(hook), Mesh3d(lantern.clone()), MeshMaterial3d(glow.clone()), Transform::default()))
@@ -112,14 +140,20 @@ pub fn spawn(
                 MeshMaterial3d(dark.clone()),
                 Transform::default(),
             ))
-            .with_child(PointLight { intensity: 9000.0, range: 1.5, color: WARM, ..default() });
+            .with_child(PointLight { intensity: 9000.0, range: 1.5, color: WARM, ..default() })
+            .with_child(named(name, 0.075 * side));
     }
     // The fire, in a ring of stones.
     for index in 0..9 {
         let (sin, cos) = (TAU * index as f32 / 9.0).sin_cos();
-        let mesh = meshes.add(Sphere::new(0.05 + 0.012 * chance(index, 9)));
-        let place = FIRE + Vec3::new(0.15 * cos, 0.0, 0.15 * sin);
-        commands.spawn((Mesh3d(mesh), MeshMaterial3d(stone.clone()), Transform::from_translation(place)));
+        let radius = 0.05 + 0.012 * chance(index, 9);
+        let (mesh, place) = (meshes.add(Sphere::new(radius)), FIRE + Vec3::new(0.15 * cos, 0.0, 0.15 * sin));
+        let pose = Transform::from_translation(place);
+        let mut entity = commands.spawn((Mesh3d(mesh), MeshMaterial3d(stone.clone()), pose));
+        // The one in front of the fire.
+        if index == 2 {
+            entity.with_child(named("stone", radius * Vec3::Y));
+        }
     }
     let flame = meshes.add(Sphere::new(1.0));
     for index in 0..FLAMES {
@@ -140,16 +174,30 @@ pub fn spawn(
         ..default()
     });
     let streamers = [
-        (0.0, 0.62, [0.12, 0.2, 0.5], [0.92, 0.93, 0.95]),
-        (0.2, 0.52, [0.82, 0.16, 0.14], [1.0, 0.9, 0.78]),
-        (0.38, 0.42, [0.1, 0.5, 0.42], [0.95, 0.95, 0.85]),
+        ("long streamer", 24, 0.0, 0.62, [0.12, 0.2, 0.5], [0.92, 0.93, 0.95]),
+        ("middle streamer", 14, 0.2, 0.52, [0.82, 0.16, 0.14], [1.0, 0.9, 0.78]),
+        ("short streamer", 5, 0.38, 0.42, [0.1, 0.5, 0.42], [0.95, 0.95, 0.85]),
     ];
-    for (below, length, dark, light) in streamers {
+    for (name, ring, below, length, dark, light) in streamers {
         let material = MeshMaterial3d(cloth.clone());
         let mesh = Mesh3d(meshes.add(streamer(below, length, dark, light)));
         // The box of a mesh does not follow its vertices.
-        commands.spawn((Moving::Streamer { below, length }, mesh, material, NoFrustumCulling, Transform::default()));
+        let mut streamer = commands.spawn((
+            Moving::Streamer { below, length },
+            mesh,
+            material,
+            NoFrustumCulling,
+            Transform::default(),
+        ));
+        // On the upper side of a ring.
+        let point = ring * POINTS + POINTS / 4;
+        streamer.with_child((Moving::OnStreamer { below, length, point }, named(name, Vec3::ZERO)));
     }
+}
+
+/// Returns a point whose track is written beside the pictures, at a place on its parent.
+fn named(name: &'static str, place: Vec3) -> (FilmedPoint, Transform) {
+    (FilmedPoint::new(name), Transform::from_translation(place))
 }
 
 const SUN: Color = Color::srgb(1.0, 0.94, 0.84);
@@ -172,7 +220,18 @@ pub fn place(world: &mut World, seconds: f32) {
                 let sway = Vec3::new((TAU * turn + place.y).sin(), 0.3 * (TAU * turn).cos(), (TAU * turn).cos());
                 pose.translation = place + 0.018 * (place.y / CROWN.y) * sway;
             }
-            Moving::Streamer { .. } | Moving::FireLight => {}
+            Moving::OnStreamer { below, length, point } => {
+                pose.translation = Vec3::from(streamer_points(below, length, turn)[point]);
+            }
+            Moving::Streamer { .. } | Moving::FireLight | Moving::OnPetal(_) => {}
+        }
+    }
+    for (part, mut visibility) in world.query::<(&Moving, &mut Visibility)>().iter_mut(world) {
+        if let Moving::OnPetal(index) = *part {
+            let Transform { translation, scale, .. } = petal(index, turn);
+            // From half of its width on.
+            let is_seen = translation.y > GRASS && scale.x > 0.5 * petal_size(index);
+            *visibility = if is_seen { Visibility::Inherited } else { Visibility::Hidden };
         }
     }
     let flicker = 1.0 + 0.25 * (3.0 * TAU * turn).sin() + 0.12 * (7.0 * TAU * turn).cos();
@@ -238,8 +297,13 @@ fn petal(index: usize, turn: f32) -> Transform {
     Transform {
         translation: from.lerp(to, way) + 0.18 * Vec3::Y * (TAU / 2.0 * age).sin() + flutter,
         rotation: Quat::from_euler(EulerRot::YXZ, angle, TAU * (2.0 * age + chance(index, 17)), TAU * age),
-        scale: Vec3::new(1.0, 0.28, 0.72) * (0.75 + 0.5 * chance(index, 18)) * grown(age, 0.12),
+        scale: Vec3::new(1.0, 0.28, 0.72) * petal_size(index) * grown(age, 0.12),
     }
+}
+
+/// Returns the scale of a petal between its beginning and its end.
+fn petal_size(index: usize) -> f32 {
+    0.75 + 0.5 * chance(index, 18)
 }
 
 /// Returns the pose and the color of a lick of flame.
@@ -263,6 +327,12 @@ fn blossoms(radius: f32, index: usize) -> Mesh {
     mesh.duplicate_vertices();
     mesh.compute_flat_normals();
     mesh
+}
+
+/// Returns the highest vertex of a mesh.
+fn highest(mesh: &Mesh) -> Vec3 {
+    let points = mesh.attribute(Mesh::ATTRIBUTE_POSITION).and_then(|points| points.as_float3()).unwrap_or_default();
+    points.iter().copied().map(Vec3::from).max_by(|a, b| a.y.total_cmp(&b.y)).unwrap_or_default()
 }
 
 /// Moves the vertices of a mesh.

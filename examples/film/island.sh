@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The demo from end to end: films the island, trains and bakes it, and evaluates the cameras that were held out, at the moments of the
-# training and halfway between them. In: a folder for everything, and options of the example `film`, such as --size 400. Out: FOLDER/island.gs4d
-# with its report, and two tables.
+# training and halfway between them, and sockets on the points whose tracks are known. In: a folder for everything, and options of the example
+# `film`, such as --size 400. Out: FOLDER/island.gs4d with its report, and three tables.
 #
 #   examples/film/island.sh [FOLDER] [OPTIONS OF THE EXAMPLE...]
 #
@@ -22,3 +22,5 @@ printf '\nCameras that were held out, at their own moments of the film:\n'
 gs4d eval "$folder/island.gs4d" --data "$folder/dataset" --split test
 printf '\nThe same cameras, halfway between the moments of the training:\n'
 gs4d eval "$folder/island.gs4d" --data "$folder/between" --split train
+printf '\nSockets on ten points, followed from the middle of the film, and their known tracks:\n'
+gs4d socket "$folder/island.gs4d" --points "$folder/dataset/points.json"

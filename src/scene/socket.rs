@@ -56,12 +56,17 @@ impl Socket {
         Some(before.toward(self.samples.get(after)?, time))
     }
 
+    /// Returns whether a socket may have this name.
+    pub(crate) fn is_name(name: &str) -> bool {
+        !name.trim().is_empty() && name.len() <= LONGEST_NAME && !name.contains(char::is_control)
+    }
+
     /// Checks that it can be used: a name, one sample at least, finite values, ascending times, unit rotations.
     ///
     /// # Errors
     /// A description of the first fault.
     pub fn check(&self) -> Result<(), &'static str> {
-        if self.name.trim().is_empty() || self.name.len() > LONGEST_NAME || self.name.contains(char::is_control) {
+        if !Self::is_name(&self.name) {
             return Err("the name of a socket that is empty, longer than 256 bytes, or has control characters");
         }
         if self.samples.is_empty() {

@@ -1,9 +1,9 @@
 //! `testing::film`: a scene of Bevy's own means, filmed as a dataset.
 //!
-//! In: a moving, unlit sphere; the island of the example `film`. Out: proof that the island is a loop and stays in
-//! sight, that the crate's reader opens the dataset, that the cameras project the sphere onto its pixels, that coverage
-//! is right, that runs repeat to the byte, and that folders are not overwritten. Tests that draw are skipped without a
-//! GPU; a software driver is enough.
+//! In: a moving, unlit sphere with a point; the island of the example `film`. Out: proof that the island is a loop,
+//! stays in sight and has ten points, that the crate's reader opens the dataset, that the cameras project the sphere
+//! onto its pixels, that coverage is right, that points have their places, that runs repeat to the byte, and that
+//! folders are not overwritten. Tests that draw are skipped without a GPU; a software driver is enough.
 
 #[path = "../../examples/film/island.rs"]
 mod island;
@@ -12,13 +12,17 @@ use crate::support::no_gpu::no_gpu;
 use bevy::ecs::system::RunSystemOnce;
 use bevy::prelude::*;
 use bevy_gs4d::offline::dataset::{CameraOptions, Dataset, Split, TrainingView};
-use bevy_gs4d::testing::{self, Film, FilmError, Filmed, HoldOut, Rig, has_gpu};
+use bevy_gs4d::offline::sockets::KnownPoint;
+use bevy_gs4d::scene::Origin;
+use bevy_gs4d::testing::{self, Film, FilmError, Filmed, FilmedPoint, HoldOut, Rig, has_gpu};
 use bevy_gs4d::view::RasterFov;
 use std::collections::BTreeMap;
 use std::path::Path;
 
 const SIZE: UVec2 = UVec2::splat(64);
 const TIMES: [f32; 3] = [0.0, 0.25, 1.0];
+/// The place of a point that is hidden at the first time.
+const LATE: Vec3 = Vec3::new(1.0, 2.0, -3.0);
 
 #[derive(Component)]
 struct Ball;
@@ -33,14 +37,23 @@ fn advance(time: Res<Time>, mut ball: Single<&mut Transform, With<Ball>>) {
     ball.translation += center(time.delta_secs());
 }
 
-/// Films a sphere that moves by itself, from six cameras at three times.
+/// Films a sphere that moves by itself, with a point on its side, from six cameras at three times.
 fn film_into(folder: &Path) -> Result<Filmed, FilmError> {
     let mut app = testing::app(SIZE);
     app.add_systems(Update, advance);
     let mesh = app.world_mut().resource_mut::<Assets<Mesh>>().add(Sphere::new(0.6));
     let material = StandardMaterial { base_color: Color::srgb_u8(200, 100, 50), unlit: true, ..default() };
     let material = app.world_mut().resource_mut::<Assets<StandardMaterial>>().add(material);
-    app.world_mut().spawn((Ball, Mesh3d(mesh), MeshMaterial3d(material), Transform::default()));
+    app.world_mut()
+        .spawn((Ball, Mesh3d(mesh), MeshMaterial3d(material), Transform::default()))
+        .with_child((FilmedPoint::new("side"), Transform::from_xyz(0.6, 0.0, 0.0)));
+    let late = (FilmedPoint::new("late"), Transform::from_translation(LATE), Visibility::Hidden);
+    let late = app.world_mut().spawn(late).id();
+    let show = |world: &mut World, seconds: f32| {
+        if seconds > 0.2 {
+            world.entity_mut(late).insert(Visibility::Inherited);
+        }
+    };
     let own = app.world_mut().spawn(Camera3d::default()).id();
     let film = Film {
         size: SIZE,
@@ -48,7 +61,7 @@ fn film_into(folder: &Path) -> Result<Filmed, FilmError> {
         ..Film::new(Rig::hemisphere(Vec3::ZERO, 5.0, 6), TIMES.into())
     };
     let mut shown = Vec::new();
-    let filmed = testing::film(&mut app, &film, folder, |_, _| {}, |done, all| shown.push((done, all)))?;
+    let filmed = testing::film(&mut app, &film, folder, show, |done, all| shown.push((done, all)))?;
     assert_eq!(shown, (1..=18).map(|done| (done, 18)).collect::<Vec<_>>(), "every picture is reported once");
     assert!(app.world().get::<Camera>(own).is_some_and(|own| own.is_active), "the app's own camera is active again");
     Ok(filmed)
@@ -83,6 +96,22 @@ fn check(view: &TrainingView) {
     for pixel in edge {
         let far = [200_u8, 100, 50].iter().zip(pixel.0).any(|(expected, value)| expected.abs_diff(value) > 2);
         assert!(!far, "straight alpha keeps the color at the edge of {name}: {:?}", pixel.0);
+    }
+}
+
+/// Checks the tracks of the points.
+fn check_points(path: &Path) {
+    let points = KnownPoint::read(path, &Origin::default()).expect("the file has known points");
+    let [late, side] = points.as_slice() else { panic!("two points, not {points:?}") };
+    assert_eq!((late.name.as_str(), side.name.as_str()), ("late", "side"), "the names");
+    let there = Some(LATE.to_array());
+    assert_eq!(late.track, [(0.0, None), (0.25, there), (1.0, there)], "a point is not there while it is hidden");
+    assert_eq!(side.track.len(), TIMES.len(), "every time once");
+    for ((time, place), expected) in side.track.iter().zip(TIMES) {
+        let place = Vec3::from(place.expect("it is never hidden"));
+        // Seconds equal the time from 0 to 1, as above.
+        let far = place.distance(center(expected) + Vec3::X * 0.6);
+        assert!(*time == expected && far < 1e-4, "the point on the sphere is {far} off at {time}");
     }
 }
 
@@ -127,9 +156,11 @@ fn a_filmed_scene_is_a_dataset_whose_cameras_project_the_scene_onto_its_pixels()
         dataset.views.iter().for_each(check);
     }
 
+    check_points(&first.join("points.json"));
+
     film_into(&second).expect("the scene is filmed again");
     let [one, other] = [&first, &second].map(|folder| files(folder));
-    assert_eq!(one.len(), 18 + 3, "18 pictures and 3 camera files");
+    assert_eq!(one.len(), 18 + 4, "18 pictures, 3 camera files and the points");
     for (name, bytes) in &one {
         assert!(other.get(name) == Some(bytes), "{name} is the same in both runs");
     }
@@ -160,12 +191,47 @@ fn places(world: &mut World, seconds: f32) -> (Vec<Transform>, Vec<[f32; 3]>) {
     (poses, meshes.into_iter().filter_map(points).flatten().collect())
 }
 
-#[test]
-fn the_island_is_a_loop_that_depends_on_the_time_alone() {
+/// Returns the place of each named point of the island at a time, world space.
+fn points(world: &mut World, seconds: f32) -> BTreeMap<String, Vec3> {
+    island::place(world, seconds);
+    let mut points = world.query::<(&FilmedPoint, &Transform, &ChildOf)>();
+    let world = &*world;
+    let place = |(point, pose, parent): (&FilmedPoint, &Transform, &ChildOf)| {
+        let parent = world.get::<Transform>(parent.parent()).expect("a point is on a thing with a pose");
+        (point.0.clone(), parent.transform_point(pose.translation))
+    };
+    points.iter(world).map(place).collect()
+}
+
+/// Returns a world with the island.
+fn island_world() -> World {
     let mut world = World::new();
     world.init_resource::<Assets<Mesh>>();
     world.init_resource::<Assets<StandardMaterial>>();
     world.run_system_once(island::spawn).expect("the scene is spawned");
+    world
+}
+
+#[test]
+fn the_island_has_ten_points_of_which_two_stand_still() {
+    let mut world = island_world();
+    assert_eq!(world.query::<&FilmedPoint>().iter(&world).count(), 10, "the points");
+    let (first, later) = (points(&mut world, 1.8), points(&mut world, 2.1));
+    assert_eq!(first.len(), 10, "each has a name of its own: {first:?}");
+    let standing = first.iter().filter(|(name, place)| later.get(*name) == Some(*place));
+    let standing: Vec<&str> = standing.map(|(name, _)| name.as_str()).collect();
+    assert_eq!(standing, ["gate", "stone"], "the others move: {first:?} and then {later:?}");
+    let hidden = |visibility: &&Visibility| **visibility == Visibility::Hidden;
+    let count = world.query_filtered::<&Visibility, With<FilmedPoint>>().iter(&world).filter(hidden).count();
+    assert_eq!(count, 0, "all can be seen in the middle of the loop");
+    points(&mut world, 0.0);
+    let count = world.query_filtered::<&Visibility, With<FilmedPoint>>().iter(&world).filter(hidden).count();
+    assert_eq!(count, 2, "the petals are hidden before they fall");
+}
+
+#[test]
+fn the_island_is_a_loop_that_depends_on_the_time_alone() {
+    let mut world = island_world();
     let first = places(&mut world, 0.0);
     let later = places(&mut world, 1.3);
     let last = places(&mut world, island::SECONDS);

@@ -246,6 +246,8 @@ const REFUSED: &[(&str, &str)] = &[
     ),
     ("socket a --list --name n", "the argument '--list' cannot be used with '--name <NAME>'"),
     ("socket a --list --out o", "the argument '--list' cannot be used with '--out <OUT>'"),
+    ("socket a --points p --name n", "the argument '--points <FILE>' cannot be used with '--name <NAME>'"),
+    ("socket a --points p --out o", "the argument '--points <FILE>' cannot be used with '--out <OUT>'"),
     ("socket a --name n --remove --out o --at 0,0,0", "the argument '--remove' cannot be used with '--at <X,Y,Z>'"),
     ("socket a --name n --remove --out o --time 0", "the argument '--remove' cannot be used with '--time <T>'"),
     ("socket a --name n --remove --out o --rate 9", "the argument '--remove' cannot be used with '--rate <HZ>'"),
@@ -525,7 +527,7 @@ const ALWAYS: &[(&str, &[&str])] = &[
     ("compare", &[]),
     ("join", &["--level", "--out"]),
     ("split", &["--chunk", "--level", "--out"]),
-    ("socket", &["--list", "--remove"]),
+    ("socket", &["--list", "--points", "--remove"]),
     ("collide", &["--out", "--remove"]),
     ("synth", &["--grow", "--level", "--out", "--seed", "--sh-degree"]),
     (

@@ -1,17 +1,20 @@
 //! `gs4d socket`, run as a user runs it.
 //!
 //! In: packages of a body that moves in a straight line, whose Gaussians succeed each other. Out: proof that a socket
-//! follows the body and is stored, replaced, listed and removed, that the time at which it is lost is told, and that
-//! points and names that cannot be used are refused.
+//! follows the body and is stored, replaced, listed and removed, that the time at which it is lost is told, that points
+//! are compared with their known tracks, and that points and names that cannot be used are refused.
 
 use crate::support::command::{arguments, folder, gs4d};
+use crate::support::folders::contents;
 use bevy_gs4d::codec::package::WriteSettings;
 use bevy_gs4d::codec::{self, ReadOptions};
 use bevy_gs4d::gaussian::{Gaussian, Harmonics};
 use bevy_gs4d::offline::work::save;
 use bevy_gs4d::scene::{GaussianScene, RuntimeScene};
 use glam::Vec3;
+use serde_json::{Value, json};
 use std::ffi::OsString;
+use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
@@ -104,6 +107,55 @@ fn a_lost_point_is_reported_with_the_time_and_nothing_is_written_without_a_path(
     let text = gs4d(&place).text();
     assert!(text.contains("after 0.") && text.contains("nothing: --out"), "for people: {text}");
     assert!(read(&scene).sockets.is_empty(), "the input is unchanged");
+}
+
+#[test]
+fn points_are_compared_with_their_known_tracks() {
+    let folder = folder();
+    let (scene, file) = (body(&folder, "scene.gs4d", f32::INFINITY), folder.path().join("points.json"));
+    let times: Vec<f32> = (0..=20).map(|index| index as f32 / 20.0).collect();
+    let track =
+        |start: Vec3| -> Vec<[f32; 3]> { times.iter().map(|time| (start + VELOCITY * *time).to_array()).collect() };
+    let points = json!({ "hand": track(Vec3::new(0.1, 0.2, 0.0)), "moon": track(Vec3::splat(9.0)) });
+    let text = json!({ "seconds": [0, 1], "times": times, "points": points }).to_string();
+    fs::write(&file, text).expect("the folder can be written to");
+    let before = contents(folder.path());
+    let compare = arguments!["socket", &scene, "--points", &file];
+    let report = gs4d(&[&compare[..], &arguments!["--json"]].concat()).json();
+    let compared = report["compared"].as_array().expect("a list");
+    let [hand, moon] = compared.as_slice() else { panic!("two points: {report}") };
+    assert_eq!((&hand["name"], &moon["name"]), (&"hand".into(), &"moon".into()), "the names");
+    assert_eq!(
+        (&hand["time"], &hand["places"]),
+        (&0.5_f64.into(), &21.into()),
+        "from the middle, at all times: {report}"
+    );
+    assert_eq!(
+        (&hand["lost_percent"], &moon["lost_percent"]),
+        (&0.0_f64.into(), &100.0_f64.into()),
+        "only one is there"
+    );
+    for key in ["largest_percent", "mean_percent", "way_back_percent"] {
+        let off = hand[key].as_f64().expect("a number");
+        assert!(off < 1.0, "{key}: {off}");
+        assert_eq!(moon[key], Value::Null, "{key} of what is not there");
+    }
+    let text = gs4d(&compare).text();
+    for expected in ["way back", "hand", "100.00 %", "size"] {
+        assert!(text.contains(expected), "{expected}: {text}");
+    }
+    assert!(contents(folder.path()) == before, "nothing is written");
+
+    for (text, expected) in [
+        ("[", "points.json: is no file of known points"),
+        ("{\"times\": [0, 1], \"points\": {\"hand\": [null]}}", "points.json: the point hand has 1 places for 2 times"),
+        ("{\"times\": [7], \"points\": {\"hand\": [[0, 0, 0]]}}", "scene.gs4d: the point hand has no known place"),
+    ] {
+        fs::write(&file, text).expect("the folder can be written to");
+        gs4d(&compare).must_fail(expected);
+    }
+    fs::remove_file(&file).expect("the file exists");
+    gs4d(&compare).must_fail("points.json: ");
 }
 
 #[test]

@@ -1,19 +1,19 @@
 //! `gs4d socket SCENE --name NAME --at X,Y,Z --time T -o OUT`: places a named point that follows a part of a capture.
 //!
 //! In: a capture, a point in it at a time. Out: a package with the track of the point; a report of its error, and of the
-//! times at which it is lost. Also lists and removes sockets.
+//! times at which it is lost. Also lists and removes sockets, and compares points with their known tracks.
 
 use crate::cli::args::{CheckpointArgs, file_size, values};
 use crate::cli::output::failure::Failure;
 use crate::cli::output::progress::Bars;
 use crate::cli::output::report::Report;
 use crate::cli::output::table::{Table, bytes, lines};
-use crate::offline::sockets::{Followed, Placement, follow};
+use crate::offline::sockets::{Compared, Comparison, Followed, KnownPoint, Placement, compare, follow};
 use crate::offline::store::outputs::Files;
 use crate::offline::work::{save, write_settings};
 use crate::scene::{GaussianScene, Socket};
 use serde_json::{Value, json};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Place a named point that follows what it is placed on, so that a game can attach props and effects to it.
 ///
@@ -26,6 +26,7 @@ Examples:
   gs4d socket dancer.gs4d --name hand --at 0.31,-0.05,1.2 --time 0.5 --json
   gs4d socket with-hand.gs4d --list
   gs4d socket with-hand.gs4d --name hand --remove -o dancer.gs4d
+  gs4d socket island.gs4d --points dataset/points.json
 
 Positions are in capture units, times are timestamps: gs4d info shows the bounds and the time interval. In Bevy, a child CaptureSocket(\"hand\")
 of the capture has the transform of the socket.")]
@@ -34,15 +35,15 @@ pub(crate) struct SocketVerb {
     #[arg(value_name = "SCENE")]
     scene: PathBuf,
     /// The name of the socket.
-    #[arg(long, value_name = "NAME", required_unless_present = "list")]
+    #[arg(long, value_name = "NAME", required_unless_present_any = ["list", "points"])]
     name: Option<String>,
     /// The position, capture space: on or in the part to follow.
     #[arg(long, value_name = "X,Y,Z", value_parser = values::point, allow_hyphen_values = true)]
-    #[arg(required_unless_present_any = ["list", "remove"])]
+    #[arg(required_unless_present_any = ["list", "remove", "points"])]
     at: Option<[f32; 3]>,
     /// The time at which the position is meant, a timestamp of the capture.
     #[arg(long, value_name = "T", value_parser = values::number, allow_hyphen_values = true)]
-    #[arg(required_unless_present_any = ["list", "remove"])]
+    #[arg(required_unless_present_any = ["list", "remove", "points"])]
     time: Option<f32>,
     /// Samples of the track a second at speed 1 [default: 60].
     #[arg(long, value_name = "HZ", value_parser = values::positive)]
@@ -56,21 +57,28 @@ pub(crate) struct SocketVerb {
     /// List the sockets of SCENE instead.
     #[arg(long, conflicts_with_all = ["name", "at", "time", "rate", "out", "remove"])]
     list: bool,
+    /// Compare sockets with the known tracks of the points in this file instead: the points.json of the film that SCENE
+    /// was trained on. Each is placed where the point is in the middle of the time. Nothing is written.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["name", "at", "time", "out", "remove", "list"])]
+    points: Option<PathBuf>,
 }
 
 /// Samples of a track a second, unless another number is given: a frame of most displays.
 const RATE: f32 = 60.0;
 
 impl SocketVerb {
-    /// Places, removes or lists sockets.
+    /// Places, removes, lists or compares sockets.
     ///
     /// # Errors
-    /// A capture that cannot be read, a point that cannot be followed, no socket of the name to remove, a package that
-    /// cannot be written.
+    /// A capture or known points that cannot be read, a point that cannot be followed, no socket of the name to remove,
+    /// a package that cannot be written.
     pub(crate) fn run(&self) -> Result<Report, Failure> {
         let files = Files::default().reads_scene(&self.scene);
         self.out.iter().fold(files, |files, out| files.writes(out, "gs4d")).check()?;
         let mut scene = CheckpointArgs::default().load(&self.scene)?;
+        if let Some(file) = &self.points {
+            return self.compare(&scene, file);
+        }
         let followed = match (&self.name, self.at, self.time) {
             (Some(name), Some(position), Some(time)) => {
                 let samples = self.samples(scene.playback.duration_seconds)?;
@@ -88,6 +96,44 @@ impl SocketVerb {
         };
         let size = self.save(&scene)?;
         Ok(self.report(&scene.sockets, followed.as_ref(), size))
+    }
+
+    /// Compares sockets with the known tracks of the points in a file.
+    fn compare(&self, scene: &GaussianScene, file: &Path) -> Result<Report, Failure> {
+        let known = KnownPoint::read(file, &scene.trained_with.origin)?;
+        let samples = self.samples(scene.playback.duration_seconds)?;
+        let compared = compare(scene, &known, samples, &mut Bars::default());
+        let Comparison { size, points } = compared.map_err(|error| Failure::at(&self.scene, &error))?;
+        let mut table = Table::new(&["point", "from", "to", "largest", "mean", "lost", "way back"]);
+        let percent = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.2} %"));
+        for point in &points {
+            let Compared { name, interval: [from, to], .. } = point;
+            let cells = percentages(point, size).map(percent);
+            table.row([name.clone(), from.to_string(), to.to_string()].into_iter().chain(cells));
+        }
+        let of = |point: &Compared| {
+            let Compared { name, time, interval: [from, to], places, .. } = point;
+            let [largest, mean, lost, way_back] = percentages(point, size);
+            json!({
+                "name": name,
+                "time": time,
+                "from": from,
+                "to": to,
+                "places": places,
+                "largest_percent": largest,
+                "mean_percent": mean,
+                "lost_percent": lost,
+                "way_back_percent": way_back,
+            })
+        };
+        let json = json!({
+            "scene": self.scene.display().to_string(),
+            "points": file.display().to_string(),
+            "size": size,
+            "compared": points.iter().map(of).collect::<Vec<_>>(),
+        });
+        let of_size = format!("{size:.3} units: distances are parts of it");
+        Ok(Report::new(json, format!("{table}{}", lines(&[("size", of_size)]))))
     }
 
     /// Returns the number of samples over a capture that plays for `seconds`; over a still as over one second.
@@ -179,6 +225,13 @@ fn followed_json(followed: &Followed) -> Value {
         "return_of_before": back_before,
         "return_of_after": back_after,
     })
+}
+
+/// Returns the largest and the mean distance of a point from its known track in percent of the size of the capture, the
+/// share of the known places at which it is lost, and by how much the way back misses the start, both in percent, too.
+fn percentages(point: &Compared, size: f32) -> [Option<f64>; 4] {
+    let of_size = |distance: Option<f32>| distance.map(|distance| 100.0 * f64::from(distance) / f64::from(size));
+    [of_size(point.largest), of_size(point.mean), Some(100.0 * point.lost()), of_size(point.way_back)]
 }
 
 /// Returns a table of sockets.

@@ -33,6 +33,19 @@ pub enum SocketError {
         /// The time, timestamp units.
         time: f32,
     },
+    /// A known point has no place at the times of the capture.
+    #[error(
+        "the point {name} has no known place within the time interval of the capture, {first} to {last}: give the \
+         points of the film that the capture was trained on"
+    )]
+    Unknown {
+        /// The name of the point.
+        name: String,
+        /// The first time of the capture, timestamp units.
+        first: f32,
+        /// The last time of the capture, timestamp units.
+        last: f32,
+    },
     /// The capture is a sequence of stills.
     #[error(
         "its Gaussians come and go and none of them moves, as in a sequence of stills, so that there is no motion to \

@@ -68,6 +68,19 @@ pub fn follow(
     placement: &Placement,
     progress: &mut dyn Progress,
 ) -> Result<Followed, SocketError> {
+    follow_within(&Cloud::of(scene)?, scene.trained_with.time_interval, placement, progress)
+}
+
+/// As [`follow`], from the first to the last time of an interval, timestamp units, over which the samples are spread.
+///
+/// # Errors
+/// As [`follow`].
+pub(super) fn follow_within(
+    cloud: &Cloud,
+    [first, last]: [f32; 2],
+    placement: &Placement,
+    progress: &mut dyn Progress,
+) -> Result<Followed, SocketError> {
     let Placement { name, position, time, samples } = placement.clone();
     let start = SocketSample { time, position, rotation: Quat::IDENTITY.to_array(), error: 0.0 };
     let mut socket = Socket { name, samples: vec![start] };
@@ -75,15 +88,13 @@ pub fn follow(
     if !(2..Socket::MOST_SAMPLES).contains(&samples) {
         return Err(SocketError::Invalid("a number of samples of a socket that is not from 2 to 65535"));
     }
-    let [first, last] = scene.trained_with.time_interval;
     if !(first..=last).contains(&time) {
         return Err(SocketError::Outside { time, first, last });
     }
-    let cloud = Cloud::of(scene)?;
     if cloud.is_still {
         return Err(SocketError::Still);
     }
-    let follower = Follower::placed(&cloud, &start)?;
+    let follower = Follower::placed(cloud, &start)?;
     let moments = moments([first, last], time, samples);
     // Each way is gone back.
     progress.begin("following", 2 * moments.iter().map(Vec::len).sum::<usize>());
@@ -263,59 +274,13 @@ impl State {
 
 #[cfg(test)]
 mod tests {
+    use super::super::fixture::{TURN, body, gaussian, place, scene};
     use super::*;
     use crate::gaussian::{Gaussian, Harmonics};
     use crate::offline::work::NoProgress;
     use crate::offline::work::progress::InterruptedProgress;
     use crate::scene::RuntimeScene;
     use crate::scene::random::Random;
-
-    /// The angular velocity of the body: three quarters of a turn.
-    const TURN: DVec3 = DVec3::new(0.9, -1.1, 4.5);
-    /// The velocity of its center.
-    const DRIFT: DVec3 = DVec3::new(1.5, 0.4, -0.3);
-
-    /// Returns where a point of the body is at a time.
-    fn place(point: DVec3, time: f64) -> DVec3 {
-        DRIFT * time + DQuat::from_scaled_axis(TURN * time) * point
-    }
-
-    /// Returns a body of radius 0.5 whose Gaussians live for a part of the time and succeed each other; of those whose
-    /// own times are below `end`.
-    fn body(end: f64) -> GaussianScene {
-        let mut random = Random::new(7);
-        let mut gaussians = Vec::new();
-        for _ in 0..300 {
-            let [x, y, z] = [(); 3].map(|()| f64::from(random.in_range(-1.0, 1.0)));
-            let point = DVec3::new(x, y, z).normalize_or_zero() * 0.5 * f64::from(random.unit()).cbrt();
-            let phase = f64::from(random.unit());
-            for generation in 0..22 {
-                let time = 0.06 * (f64::from(generation) + phase) - 0.2;
-                let mean = place(point, time);
-                let velocity = DRIFT + TURN.cross(mean - DRIFT * time);
-                let gaussian = gaussian(mean.as_vec3(), time as f32, velocity.as_vec3(), 0.05);
-                gaussians.extend((time < end).then_some(gaussian));
-            }
-        }
-        scene(gaussians)
-    }
-
-    fn gaussian(mean: Vec3, mean_t: f32, velocity: Vec3, sigma_t: f32) -> Gaussian {
-        Gaussian {
-            mean: mean.to_array(),
-            mean_t,
-            velocity: velocity.to_array(),
-            sigma_t,
-            covariance: [1e-3, 0.0, 0.0, 1e-3, 0.0, 1e-3],
-            opacity: 0.8,
-            padding: 0.0,
-        }
-    }
-
-    fn scene(gaussians: Vec<Gaussian>) -> GaussianScene {
-        let values = vec![0.0; 3 * gaussians.len()];
-        RuntimeScene::sliced(gaussians, Harmonics { coefficients: 1, values, ..Harmonics::default() }).into()
-    }
 
     fn placement(point: DVec3, time: f32, samples: usize) -> Placement {
         let position = place(point, time.into()).as_vec3().to_array();

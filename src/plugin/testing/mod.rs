@@ -57,7 +57,7 @@ mod waiting;
 mod window;
 
 pub use error::TestingError;
-pub use film::{Film, FilmError, Filmed, HoldOut, Rig, film};
+pub use film::{Film, FilmError, Filmed, FilmedPoint, HoldOut, Rig, film};
 pub use gpu::has_gpu;
 pub use headless::{app, app_with};
 pub use image::{Rgba32FImage, RgbaImage};

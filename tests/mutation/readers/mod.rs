@@ -13,6 +13,7 @@ mod checkpoint;
 mod datasets;
 mod edits;
 mod imports;
+mod known_points;
 mod package;
 mod parts;
 mod pictures;
@@ -303,6 +304,13 @@ pub static KINDS: &[Kind] = &[
         extension: "ron",
         share: 1,
         make: || Arc::new(edits::Edits::new()),
+    },
+    Kind {
+        name: "known-points",
+        about: "points of a scene whose tracks are known (points.json of a film)",
+        extension: "json",
+        share: 1,
+        make: || Arc::new(known_points::KnownPoints::new()),
     },
     Kind {
         name: "scores",

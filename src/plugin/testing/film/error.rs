@@ -47,6 +47,9 @@ pub enum FilmError {
     /// Every picture is held out.
     #[error("no picture is left for training: hold out fewer cameras or fewer times")]
     NoTraining,
+    /// Two points have one name at the same time.
+    #[error("two points of the scene are named {0} at the same time: give each FilmedPoint a name of its own")]
+    SamePoint(String),
     /// The folder holds files.
     #[error(
         "{}: the folder is not empty, and its files are not overwritten: name a new folder, or empty this one",

@@ -1,16 +1,18 @@
 //! The files of a filmed dataset.
 //!
-//! In: pictures with their camera poses and times. Out: PNG files in `train`, `val` and `test`, and a camera file
-//! `transforms_*.json` in the Blender form for each split that has a picture.
+//! In: pictures with their camera poses and times; places of points. Out: PNG files in `train`, `val` and `test`, a
+//! camera file `transforms_*.json` in the Blender form for each split that has a picture, and `points.json` if there
+//! are points.
 
 use super::error::FilmError;
 use super::hold_out::Split;
+use super::points::Tracks;
 use super::writer::Writer;
 use crate::codec::CodecError;
 use crate::plugin::testing::TestingError;
 use crate::plugin::testing::readback::HalfPicture;
 use bevy::transform::components::Transform;
-use glam::UVec2;
+use glam::{UVec2, Vec3};
 use serde::Serialize;
 use std::fs;
 use std::io::{self, ErrorKind};
@@ -21,6 +23,7 @@ pub(super) struct Files<'a> {
     folder: &'a Path,
     writer: Writer,
     head: Head,
+    tracks: Tracks,
     frames: [Vec<Frame>; Split::ALL.len()],
 }
 
@@ -34,6 +37,23 @@ struct Head {
     h: u32,
     /// Seconds of the times 0 and 1.
     seconds: [f32; 2],
+}
+
+impl Head {
+    /// Returns the time of a moment in seconds: from 0, the first time of the film, to 1, its last.
+    fn time(&self, seconds: f32) -> f64 {
+        let [first, last] = self.seconds.map(f64::from);
+        if last > first { (f64::from(seconds) - first) / (last - first) } else { 0.0 }
+    }
+}
+
+/// The entries of the file of points.
+#[derive(Serialize)]
+struct PointFile<'a> {
+    /// Seconds of the times 0 and 1.
+    seconds: [f32; 2],
+    #[serde(flatten)]
+    tracks: &'a Tracks,
 }
 
 #[derive(Serialize)]
@@ -67,7 +87,7 @@ impl<'a> Files<'a> {
         }
         let tangent = (f64::from(fov_y) / 2.0).tan() * f64::from(size.x) / f64::from(size.y);
         let head = Head { camera_angle_x: 2.0 * tangent.atan(), w: size.x, h: size.y, seconds };
-        Ok(Self { folder, writer: Writer::begin(), head, frames: Default::default() })
+        Ok(Self { folder, writer: Writer::begin(), head, tracks: Tracks::default(), frames: Default::default() })
     }
 
     /// Adds a picture, which another thread writes.
@@ -81,20 +101,28 @@ impl<'a> Files<'a> {
     ) -> Result<(), FilmError> {
         let name = format!("{}/c{camera:04}_t{time:04}", split.name());
         self.writer.add(picture, self.folder.join(format!("{name}.png")))?;
-        let [first, last] = self.head.seconds.map(f64::from);
         self.frames[split as usize].push(Frame {
             file_path: format!("./{name}"),
-            time: if last > first { (f64::from(seconds) - first) / (last - first) } else { 0.0 },
+            time: self.head.time(seconds),
             seconds,
             transform_matrix: pose.to_matrix().transpose().to_cols_array_2d(),
         });
         Ok(())
     }
 
-    /// Waits for the pictures and writes the camera files. Returns the numbers of training, validation and test views.
+    /// Adds the places of points at a time, each with its name, world space.
+    pub(super) fn add_points(&mut self, seconds: f32, places: Vec<(String, Vec3)>) -> Result<(), FilmError> {
+        self.tracks.add(self.head.time(seconds), places)
+    }
+
+    /// Waits for the pictures and writes the points and the camera files. Returns the numbers of training, validation
+    /// and test views.
     pub(super) fn finish(self) -> Result<[usize; 3], FilmError> {
-        let Self { folder, writer, head, frames } = self;
+        let Self { folder, writer, head, tracks, frames } = self;
         writer.finish()?;
+        if !tracks.is_empty() {
+            write(&folder.join("points.json"), &PointFile { seconds: head.seconds, tracks: &tracks })?;
+        }
         for split in Split::ALL {
             let frames = &frames[split as usize];
             if !frames.is_empty() {
@@ -107,7 +135,7 @@ impl<'a> Files<'a> {
 }
 
 /// Writes under a temporary name, and renames the file once it is complete.
-fn write(path: &Path, file: &CameraFile<'_>) -> Result<(), FilmError> {
+fn write(path: &Path, file: &impl Serialize) -> Result<(), FilmError> {
     let partial: PathBuf = path.with_extension("json.part");
     let json = serde_json::to_vec_pretty(file);
     let written = json.map_err(io::Error::other).and_then(|json| fs::write(&partial, json));

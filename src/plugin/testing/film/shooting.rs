@@ -1,6 +1,7 @@
 //! Pictures with coverage of every camera at every time, in one pass forward in time.
 //!
-//! In: an app and a [`Film`]. Out: the dataset's files; the app at the last time, with its own cameras as before.
+//! In: an app and a [`Film`]. Out: the dataset's files, with the places of the scene's points at each time; the app at
+//! the last time, with its own cameras as before.
 //!
 //! One camera is moved from pose to pose. Bevy sizes its lists of lights by the counts of the previous frame, so a
 //! picture is drawn twice, and more often the first time at a pose. The camera draws in linear light over transparent
@@ -10,6 +11,7 @@
 use super::error::FilmError;
 use super::files::Files;
 use super::hold_out::{HoldOut, Split};
+use super::points::places;
 use super::rig::Rig;
 use crate::plugin::component::GaussianCapture3d;
 use crate::plugin::testing::pipelines::pipelines_are_ready;
@@ -101,8 +103,11 @@ pub struct Filmed {
 /// The pictures are 8-bit RGBA with straight alpha, which is the coverage: 1 on opaque meshes, 0 where nothing is
 /// drawn. Times become 0 to 1 in the camera files, from the first time to the last; the entry `seconds` has seconds.
 ///
+/// If the scene has entities with a [`FilmedPoint`](super::FilmedPoint), their tracks are written to `points.json`.
+///
 /// # Errors
-/// A film without cameras, times or pictures for training; a folder that is not empty; errors of drawing and writing.
+/// A film without cameras, times or pictures for training; a folder that is not empty; two points of one name; errors
+/// of drawing and writing.
 ///
 /// # Examples
 ///
@@ -226,7 +231,7 @@ fn shoot(
     let mut now = Duration::ZERO;
     let mut is_set = false;
     for index in 0..times.len() {
-        for (moment, place) in moments(film, times, index) {
+        for (nth, (moment, place)) in moments(film, times, index).into_iter().enumerate() {
             let seconds = moment.as_secs_f32();
             // Cameras have no scale.
             let pose = Transform { scale: Vec3::ONE, ..film.rig.poses[place] };
@@ -242,6 +247,10 @@ fn shoot(
                 settle(app)?;
             }
             draw(app)?;
+            // The first camera films at the time itself.
+            if nth == 0 {
+                files.add_points(seconds, places(app.world_mut()))?;
+            }
             let picture = read_half(app, offscreen)?;
             let split = film.hold_out.split(place, index, times.len());
             files.add(split, [place, index], seconds, &pose, picture)?;
