@@ -72,6 +72,7 @@ fn draw(headless: &mut Headless, scene: &RuntimeScene, view: &View) -> Frame {
 }
 
 #[test]
+#[ignore = "takes minutes; `.ci/full` runs it by name"]
 fn a_level_has_the_promised_psnr_in_other_views() {
     let Some(mut headless) = gpu::headless() else { return };
     let made = detail(&mut headless, clumps(), &QUICK, &mut NoProgress).expect("levels can be made");

@@ -489,6 +489,7 @@ fn frames_that_exceed_the_capacity_of_pairs_are_complete() {
 }
 
 #[test]
+#[ignore = "takes minutes; `.ci/full` runs it by name"]
 fn frames_with_more_pairs_than_the_device_allows_are_complete() {
     let Some(mut headless) = gpu::headless() else { return };
     let Some(mut limited) = limited_device::headless() else { return };
