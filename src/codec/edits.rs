@@ -3,23 +3,21 @@
 //! In: a path. Out: its [`EditList`]; an error that names the file, the line and the remedy.
 
 use super::error::CodecError;
-use super::input::open_regular;
+use super::input::read_at_most;
 use super::text::without_mark;
 use crate::scene::edit::EditList;
 use crate::scene::edit::list::MOST_BYTES;
-use std::io::{self, Read};
 use std::path::Path;
+
+/// Bytes of the mark of UTF-8, which some editors write.
+const MARK: usize = 3;
 
 /// Reads a list of edits.
 ///
 /// # Errors
 /// A file that cannot be read or is not a list of edits.
 pub fn read_edits(path: &Path) -> Result<EditList, CodecError> {
-    let at = |error: io::Error| CodecError::at(path, error);
-    let file = open_regular(path).map_err(at)?;
-    let mut text = Vec::new();
-    // One byte more than the most with a mark: a longer file is refused without being read.
-    file.take(MOST_BYTES as u64 + 4).read_to_end(&mut text).map_err(at)?;
+    let text = read_at_most(path, (MOST_BYTES + MARK) as u64).map_err(|error| CodecError::at(path, error))?;
     EditList::parse(without_mark(&text)).map_err(|error| CodecError::at(path, error))
 }
 

@@ -259,12 +259,7 @@ impl Bake {
             true => Usual::read(&settings.data, &settings.splits, progress)?,
             false => Usual::PLAIN,
         };
-        settings.rounds = self.rounds.unwrap_or(usual.rounds);
-        if let Some(tuning) = &mut settings.fine_tune {
-            tuning.exposure = self.exposure.unwrap_or(usual.is_rig);
-            tuning.steps = self.steps.unwrap_or(usual.fine_tuning);
-            tuning.patience = usual.patience;
-        }
+        self.choose(&mut settings, &usual);
         if let Some(path) = &self.jobs.plan {
             return self.plan(path, &settings, &usual, progress);
         }
@@ -409,22 +404,28 @@ impl Bake {
             // A capture that is trained from pictures has its own background or environment map.
             background: if self.is_dataset() { None } else { self.checkpoint.background },
             goal: self.goal(),
-            rounds: self.rounds.unwrap_or(Usual::PLAIN.rounds),
+            rounds: Usual::PLAIN.rounds,
             score: self.variant,
             scoring: self.scoring.settings(),
             filter: self.filter,
             key_frames: values::key_frames(self.key_frames, self.every),
-            fine_tune: (!self.no_fine_tune).then(|| FineTuneSettings {
-                steps: self.steps.unwrap_or(Usual::PLAIN.fine_tuning),
-                batch: self.batch,
-                exposure: self.exposure.unwrap_or(false),
-                ..FineTuneSettings::default()
-            }),
+            fine_tune: (!self.no_fine_tune)
+                .then(|| FineTuneSettings { batch: self.batch, ..FineTuneSettings::default() }),
             quality: self.quality,
             level: self.package.level,
             trust_images: self.validation.trust_images,
             keep_work: self.keep_work,
         })
+    }
+
+    /// Sets what depends on the dataset: the options that are given, the usual choices for the others.
+    fn choose(&self, settings: &mut BakeSettings, usual: &Usual) {
+        settings.rounds = self.rounds.unwrap_or(usual.rounds);
+        if let Some(tuning) = &mut settings.fine_tune {
+            tuning.exposure = self.exposure.unwrap_or(usual.is_rig);
+            tuning.steps = self.steps.unwrap_or(usual.fine_tuning);
+            tuning.patience = usual.patience;
+        }
     }
 
     /// Returns how many Gaussians to keep.

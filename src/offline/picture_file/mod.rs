@@ -98,10 +98,7 @@ pub enum PictureError {
 /// A file that cannot be read or is not a picture, a picture whose width or height is larger than that of `largest`.
 pub fn size(path: &Path, largest: UVec2) -> Result<UVec2, PictureError> {
     let (bytes, _) = read(path)?;
-    let decoder = reader(path, &bytes)?.into_decoder();
-    let decoder =
-        decoder.map_err(|reason| PictureError::Format { path: path.to_owned(), reason: exr::in_words(reason) })?;
-    checked_size(path, &decoder, largest)
+    checked_size(path, &decoder(path, reader(path, &bytes)?)?, largest)
 }
 
 /// Returns whether a picture has a channel of transparency, from its header.
@@ -110,10 +107,7 @@ pub fn size(path: &Path, largest: UVec2) -> Result<UVec2, PictureError> {
 /// A file that cannot be read or is not a picture.
 pub fn has_alpha(path: &Path) -> Result<bool, PictureError> {
     let (bytes, _) = read(path)?;
-    let decoder = reader(path, &bytes)?.into_decoder();
-    let decoder =
-        decoder.map_err(|reason| PictureError::Format { path: path.to_owned(), reason: exr::in_words(reason) })?;
-    Ok(decoder.color_type().has_alpha())
+    Ok(decoder(path, reader(path, &bytes)?)?.color_type().has_alpha())
 }
 
 /// Decodes a picture. Linear light (EXR) becomes sRGB-encoded colors. The contents of the file determine its format,
@@ -122,11 +116,11 @@ pub fn has_alpha(path: &Path) -> Result<bool, PictureError> {
 /// # Errors
 /// As [`size`], and a picture that is damaged or not complete.
 pub fn open(path: &Path, largest: UVec2) -> Result<DynamicImage, PictureError> {
-    let failed = |reason| PictureError::Format { path: path.to_owned(), reason: exr::in_words(reason) };
+    let failed = |reason| unreadable(path, reason);
     let (bytes, length) = read(path)?;
     let reader = reader(path, &bytes)?;
     let format = reader.format();
-    let decoder = reader.into_decoder().map_err(failed)?;
+    let decoder = decoder(path, reader)?;
     let size = checked_size(path, &decoder, largest)?;
     if format == Some(ImageFormat::Jpeg) {
         jpeg::check(&bytes).map_err(|reason| PictureError::Incomplete { path: path.to_owned(), reason })?;
@@ -161,6 +155,14 @@ fn read(path: &Path) -> Result<(Vec<u8>, u64), PictureError> {
 fn reader<'a>(path: &Path, bytes: &'a [u8]) -> Result<ImageReader<Cursor<&'a [u8]>>, PictureError> {
     let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
     reader.map_err(|reason| PictureError::Read { path: path.to_owned(), reason })
+}
+
+fn decoder<'a>(path: &Path, reader: ImageReader<Cursor<&'a [u8]>>) -> Result<impl ImageDecoder + 'a, PictureError> {
+    reader.into_decoder().map_err(|reason| unreadable(path, reason))
+}
+
+fn unreadable(path: &Path, reason: ImageError) -> PictureError {
+    PictureError::Format { path: path.to_owned(), reason: exr::in_words(reason) }
 }
 
 fn checked_size(path: &Path, decoder: &impl ImageDecoder, largest: UVec2) -> Result<UVec2, PictureError> {

@@ -3,14 +3,13 @@
 //! In: the path of a file, such as the `points.json` of a film; the origin of a capture. Out: its [`KnownPoint`]s in
 //! the space and at the timestamps of the capture; an error that names the file and the remedy.
 
-use crate::codec::input::open_regular;
+use crate::codec::input::read_at_most;
 use crate::codec::json;
 use crate::codec::text::printable;
 use crate::offline::work::FileError;
 use crate::scene::{Origin, Socket};
 use serde::Deserialize;
 use std::collections::BTreeMap;
-use std::io::Read;
 use std::path::Path;
 
 /// Most bytes of a file: 256 points at 1,000 times have about 25 MB.
@@ -43,9 +42,7 @@ impl KnownPoint {
     /// # Errors
     /// A file that cannot be read, or is no file of known points.
     pub fn read(path: &Path, origin: &Origin) -> Result<Vec<Self>, FileError> {
-        let mut bytes = Vec::new();
-        let read = open_regular(path).and_then(|file| file.take(MOST_BYTES + 1).read_to_end(&mut bytes));
-        read.map_err(|error| FileError::at(path, error))?;
+        let bytes = read_at_most(path, MOST_BYTES).map_err(|error| FileError::at(path, error))?;
         parse(&bytes, origin).map_err(|reason| FileError::at(path, reason))
     }
 }

@@ -3,7 +3,7 @@
 //! In: a text, that of another seed. Out: a text whose brackets mostly match, with a value replaced by one of another
 //! type or size, an item removed, repeated, moved or taken from the other text, or deeply nested brackets.
 
-use super::bytes::MOST;
+use super::bytes::{self, MOST};
 use super::numbers;
 use crate::support::random::Random;
 use std::iter::repeat_n;
@@ -11,6 +11,16 @@ use std::ops::Range;
 
 /// Most pieces that are inserted at once.
 const PIECES: usize = 200_000;
+
+/// Returns one of the seeds with changes, once in a while also of single bytes.
+pub fn file(seeds: &[impl AsRef<str>], random: &mut Random) -> Vec<u8> {
+    let (seed, other) = (random.pick(seeds).as_ref(), random.pick(seeds).as_ref());
+    let mut file = change(seed, other, random).into_bytes();
+    if random.one_in(16) {
+        bytes::change(&mut file, other.as_bytes(), random);
+    }
+    file
+}
 
 /// Makes one to three changes.
 pub fn change(text: &str, other: &str, random: &mut Random) -> String {

@@ -4,7 +4,7 @@
 
 use super::views::check_views;
 use super::{Outcome, Reader};
-use crate::change::{bytes, text};
+use crate::change::text;
 use crate::limits::Limits;
 use crate::support::random::Random;
 use crate::support::{dataset, packed_scene};
@@ -56,12 +56,7 @@ impl Cameras {
 
 impl Reader for Cameras {
     fn input(&self, random: &mut Random) -> Vec<u8> {
-        let (seed, other) = (random.pick(&self.seeds), random.pick(&self.seeds));
-        let mut file = text::change(seed, other, random).into_bytes();
-        if random.one_in(16) {
-            bytes::change(&mut file, other.as_bytes(), random);
-        }
-        file
+        text::file(&self.seeds, random)
     }
 
     fn read(&self, bytes: &[u8]) -> Result<Outcome, String> {

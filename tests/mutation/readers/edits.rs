@@ -5,7 +5,7 @@
 
 use super::{Outcome, Reader};
 use crate::accepted::{self, DrawnBy};
-use crate::change::{bytes, text};
+use crate::change::text;
 use crate::support::packed_scene;
 use crate::support::random::Random;
 use bevy_gs4d::scene::edit::{EditList, EditListError, Edited, Seen, apply};
@@ -58,12 +58,7 @@ impl Edits {
 
 impl Reader for Edits {
     fn input(&self, random: &mut Random) -> Vec<u8> {
-        let (seed, other) = (random.pick::<&str>(&SEEDS), random.pick::<&str>(&SEEDS));
-        let mut file = text::change(seed, other, random).into_bytes();
-        if random.one_in(16) {
-            bytes::change(&mut file, other.as_bytes(), random);
-        }
-        file
+        text::file(&SEEDS, random)
     }
 
     fn read(&self, bytes: &[u8]) -> Result<Outcome, String> {

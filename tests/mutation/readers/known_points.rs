@@ -4,7 +4,7 @@
 //! finite places at ascending times.
 
 use super::{Outcome, Reader};
-use crate::change::{bytes, text};
+use crate::change::text;
 use crate::support::random::Random;
 use bevy_gs4d::offline::sockets::KnownPoint;
 use bevy_gs4d::scene::Origin;
@@ -32,12 +32,7 @@ impl KnownPoints {
 
 impl Reader for KnownPoints {
     fn input(&self, random: &mut Random) -> Vec<u8> {
-        let (seed, other) = (random.pick::<&str>(&SEEDS), random.pick::<&str>(&SEEDS));
-        let mut file = text::change(seed, other, random).into_bytes();
-        if random.one_in(16) {
-            bytes::change(&mut file, other.as_bytes(), random);
-        }
-        file
+        text::file(&SEEDS, random)
     }
 
     fn read(&self, bytes: &[u8]) -> Result<Outcome, String> {

@@ -6,7 +6,7 @@
 use super::checkpoint::checkpoints;
 use super::{Outcome, Reader};
 use crate::accepted::{self, DrawnBy};
-use crate::change::{bytes, text};
+use crate::change::text;
 use crate::support::packed_scene;
 use crate::support::random::Random;
 use bevy_gs4d::codec::package::WriteSettings;
@@ -69,7 +69,7 @@ impl Reader for CfgArgs {
              extra=[1, (2, 3)], eval=True, prefilter_var=0.25)",
             "Namespace(white_background=False, prefilter_var=-1.0, loaded_pth='')",
         ];
-        changed(random.pick::<&str>(&SEEDS), random.pick::<&str>(&SEEDS), random)
+        text::file(&SEEDS, random)
     }
 
     fn read(&self, bytes: &[u8]) -> Result<Outcome, String> {
@@ -94,7 +94,7 @@ impl Reader for Options {
              duration_seconds: Some(3.0))",
             "(time_interval: Some((-1.0, 1.0)), prefilter_var: Some(1e-3))",
         ];
-        changed(random.pick::<&str>(&SEEDS), random.pick::<&str>(&SEEDS), random)
+        text::file(&SEEDS, random)
     }
 
     fn read(&self, bytes: &[u8]) -> Result<Outcome, String> {
@@ -105,12 +105,4 @@ impl Reader for Options {
         self.folder.read("scene.gs4d", &options)?;
         self.folder.read("chkpnt.pth", &options)
     }
-}
-
-fn changed(seed: &str, other: &str, random: &mut Random) -> Vec<u8> {
-    let mut file = text::change(seed, other, random).into_bytes();
-    if random.one_in(16) {
-        bytes::change(&mut file, other.as_bytes(), random);
-    }
-    file
 }

@@ -14,13 +14,13 @@ use crate::view::Background;
 /// Most views of each camera that are drawn.
 const VIEWS: usize = 4;
 
-/// Returns the exposures of all cameras, with the mean that changes nothing. `cameras` has the camera of each view.
+/// Returns the exposures of all cameras, with the mean that changes nothing.
 pub(super) fn first_exposures(
     trainer: &mut Trainer<'_>,
     images: &TrainingImages,
-    cameras: &[u32],
     background: Background,
 ) -> Result<Vec<Exposure>, TrainError> {
+    let cameras = images.cameras();
     let count = cameras.iter().max().map_or(0, |last| *last as usize + 1);
     let mut views = vec![Vec::new(); count];
     for (index, &camera) in cameras.iter().enumerate() {

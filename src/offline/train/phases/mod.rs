@@ -69,6 +69,9 @@ pub(crate) fn fine_tune_watched(
     let saves = resume.map(|resume| Saves::new(resume, settings));
     let stored = saves.and_then(Saves::load);
     let stored = stored.filter(|stored| session.trainer.resume(&stored.best.state));
+    if stored.is_none() {
+        session.begin_exposures()?;
+    }
     let is_coded = |stored: &&Checkpoint| stored.coded.is_some();
     let mut found = match stored.as_ref().filter(is_coded) {
         Some(Checkpoint { curve, best, .. }) => Progressed { curve: curve.clone(), best: best.clone(), pace: (0, 0.0) },

@@ -66,10 +66,6 @@ impl<'a> Session<'a> {
         let cameras = if settings.exposure { images.cameras() } else { Vec::new() };
         let batch = settings.batch.min(images.len());
         trainer.prepare(&Request { cameras: &cameras, batch, ..Request::of(settings) })?;
-        if settings.exposure && settings.growth.is_none() {
-            let exposures = first_exposures(&mut trainer, images, &cameras, background)?;
-            trainer.set_exposures(&exposures);
-        }
         let batches = Batches::new(&trainer, images, settings, background)?;
         for index in even_subset(&images.views, VIEWS_OF_ROOM) {
             trainer.make_room(&images.shots[index].view)?;
@@ -78,6 +74,15 @@ impl<'a> Session<'a> {
         let detail = coarse.is_none().then_some(Detail::Whole);
         let (given, images) = (images, Cow::Borrowed(images));
         Ok(Self { trainer, settings, given, images, detail, coarse, batches, background, support })
+    }
+
+    /// Gives exposures their values before the first step of fine-tuning, if they are trained.
+    pub(super) fn begin_exposures(&mut self) -> Result<(), TrainError> {
+        if self.settings.exposure && self.settings.growth.is_none() {
+            let exposures = first_exposures(&mut self.trainer, self.given, self.background)?;
+            self.trainer.set_exposures(&exposures);
+        }
+        Ok(())
     }
 
     /// Uses images of the size of this step, from 0, from now on. Returns whether they had another size before. Begins
