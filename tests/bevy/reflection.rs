@@ -60,6 +60,7 @@ fn reflected() -> Vec<(String, &'static str)> {
         bevy_gs4d::stereo::Eye,
         bevy_gs4d::stereo::SideBySide,
         bevy_gs4d::stereo::StereoRig,
+        bevy_gs4d::testing::FilmedPoint,
         bevy_gs4d::testing::Offscreen,
         bevy_gs4d::view::BlendSpace,
         bevy_gs4d::view::DebugView,

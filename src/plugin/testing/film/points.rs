@@ -6,7 +6,10 @@
 use super::error::FilmError;
 use bevy::camera::visibility::{InheritedVisibility, Visibility};
 use bevy::ecs::component::Component;
+use bevy::ecs::reflect::ReflectComponent;
 use bevy::ecs::world::World;
+use bevy::reflect::Reflect;
+use bevy::reflect::std_traits::ReflectDefault;
 use bevy::transform::components::{GlobalTransform, Transform};
 use glam::Vec3;
 use serde::Serialize;
@@ -39,7 +42,9 @@ use std::collections::BTreeMap;
 /// }
 /// # bevy::ecs::system::assert_is_system(setup);
 /// ```
-#[derive(Component, Debug, Default, Clone, PartialEq, Eq)]
+#[derive(Component, Reflect, Debug, Default, Clone, PartialEq, Eq)]
+#[reflect(Component, Default, Debug, Clone, PartialEq)]
+#[type_path = "bevy_gs4d::testing"]
 #[require(Transform, Visibility)]
 pub struct FilmedPoint(pub String);
 
