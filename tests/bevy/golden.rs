@@ -34,11 +34,13 @@ struct Golden {
 }
 
 #[test]
+#[ignore = "takes minutes; `.ci/full` runs it"]
 fn toybox_matches_the_original() {
     check("toybox/toybox_chkpnt.pth", "toybox/golden_vanilla");
 }
 
 #[test]
+#[ignore = "takes minutes; `.ci/full` runs it"]
 fn pruned_toybox_matches_the_original() {
     check("toybox/toybox_4dgs1k.pth", "toybox/golden_4dgs1k");
 }

@@ -267,6 +267,7 @@ fn the_duration_is_that_of_the_film_unless_given() {
 }
 
 #[test]
+#[ignore = "takes minutes; `.ci/full` runs it by name"]
 fn opaque_images_with_poses_of_others_are_an_error_at_the_end() {
     let Some(capture) = dataset() else { return };
     let path = capture.data.join("transforms_train.json");

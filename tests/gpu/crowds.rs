@@ -100,6 +100,7 @@ fn a_tile_of_45_000_splats_matches_the_cpu_reference() {
 }
 
 #[test]
+#[ignore = "takes minutes; `.ci/full` runs it by name"]
 fn a_tile_of_70_000_splats_matches_the_cpu_reference() {
     check(70_000);
 }

@@ -155,6 +155,7 @@ fn bins_with_exact_room_match_the_reference_design() {
 }
 
 #[test]
+#[ignore = "takes minutes; `.ci/full` runs it by name"]
 fn a_crowd_in_one_bin_does_not_enlarge_the_others() {
     let Some(mut headless) = gpu::headless() else { return };
     let scene = crowd(6_000, 7, 0.001);
@@ -285,6 +286,7 @@ fn pictures_of_many_tiles_have_larger_bins() {
 }
 
 #[test]
+#[ignore = "takes minutes; `.ci/full` runs it by name"]
 fn large_parts_with_several_gaussians_per_thread_match_the_reference_design() {
     let Some(mut headless) = gpu::headless() else { return };
     // From a million Gaussians on, `project_bin` uses the variant for few bins.
