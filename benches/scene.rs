@@ -206,7 +206,7 @@ fn app(arguments: &Arguments, logged: bool, kind: Kind, msaa: Msaa) -> Result<Ap
         Nothing | GlassAlone | SunAlone => {}
         Crowd | CrowdOfAll => {
             let bias = if kind == CrowdOfAll { 16.0 } else { 0.0 };
-            world.insert_resource(CaptureDetail { bias, ..default() });
+            world.insert_resource(CaptureDetail { bias });
             let away = place.forward() * 50.0;
             for index in 0..100 {
                 let right = place.right() * (3.0 * (index % 10) as f32 - 13.5);

@@ -47,5 +47,5 @@ pub use crate::plugin::playback::{
 };
 #[doc(no_inline)]
 pub use crate::plugin::render::{
-    CaptureDetail, CaptureSettings, CaptureStatistics, CaptureUploadBudget, CaptureViewSettings,
+    CaptureBudget, CaptureDetail, CaptureSettings, CaptureStatistics, CaptureUploadBudget, CaptureViewSettings,
 };

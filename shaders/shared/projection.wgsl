@@ -6,6 +6,7 @@
 #import gs4d::records::{covariance_of, Gaussian}
 #import gs4d::appearance::heat
 #import gs4d::capture::{instance, load_gaussian, load_lifespan}
+#import gs4d::importance::{boosted, importance_of, weight_of}
 #import gs4d::conic::{conic_of, determinant_of, determinant_with_less, is_drawable, screen_covariance, LOW_PASS}
 #import gs4d::tile::{contributing_tiles, tiles_of}
 
@@ -91,7 +92,16 @@ fn projection_of(index: u32) -> Projection {
     let j = instance.focal / select(q.z, 1.0, parallel);
     let mx = j.x * (instance.camera_x.xyz - ray.x * instance.camera_z.xyz);
     let my = j.y * (instance.camera_y.xyz - ray.y * instance.camera_z.xyz);
-    let covariance = covariance_of(g);
+    var covariance = covariance_of(g);
+    let thinned = instance.least_importance > 0.0;
+    var weight = 1.0;
+    if thinned {
+        weight = weight_of(importance_of(g.opacity, covariance), instance.least_importance);
+        if weight == 0.0 {
+            return p;
+        }
+        covariance *= instance.growth;
+    }
     let screen = screen_covariance(covariance, mx, my);
     if !is_drawable(screen) {
         return p;
@@ -99,7 +109,10 @@ fn projection_of(index: u32) -> Projection {
     let det = determinant_of(screen, covariance, mx, my);
     let mid = 0.5 * (screen.x + screen.z);
     let radius = ceil(3.0 * sqrt(mid + sqrt(max(0.1, mid * mid - det))));
-    let opacity = g.opacity * marginal * instance.opacity * compensation(j, screen, det);
+    var opacity = g.opacity * marginal * instance.opacity * compensation(j, screen, det);
+    if thinned {
+        opacity = boosted(opacity * weight, instance.boost);
+    }
     let square = tiles_of(center, radius, vec2<f32>(instance.tiles));
     let tiles = contributing_tiles(square, center, screen.xz, opacity);
     // The negated comparison is true for NaN, which counts as invisible.

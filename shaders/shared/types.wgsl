@@ -73,6 +73,12 @@ struct InstanceUniforms {
     crop_x: vec4<f32>,
     crop_y: vec4<f32>,
     crop_z: vec4<f32>,
+    // Gaussians of at most this importance are not drawn, capture units; 0: all are drawn, unchanged.
+    least_importance: f32,
+    // Factor on the covariances of the others, and power of their transmittance.
+    growth: f32,
+    boost: f32,
+    padding: f32,
 }
 
 // The view of one part of a capture in the previous frame.

@@ -19,6 +19,7 @@ pub(crate) mod conic;
 pub(crate) mod eigen;
 pub(crate) mod gradient;
 pub(crate) mod harmonics;
+pub(crate) mod importance;
 mod lifespan;
 pub(crate) mod overlap;
 mod parameters;

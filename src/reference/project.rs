@@ -4,6 +4,7 @@
 
 use super::{Layer, activate};
 use crate::gaussian::ShDirection;
+use crate::gaussian::importance::thinned;
 use crate::gaussian::overlap::{TileRect, contributing_tiles};
 use crate::gaussian::projection::project_with;
 use crate::view::BlendSpace;
@@ -60,14 +61,14 @@ pub fn project(layer: &Layer<'_>, space: BlendSpace) -> Vec<Splat> {
 
 fn project_one(layer: &Layer<'_>, index: usize, space: BlendSpace, clip: &[Vec4; 2]) -> Splat {
     let Layer { scene, view, appearance } = layer;
-    let gaussian = &scene.gaussian(index);
+    let Some(gaussian) = &thinned(&scene.gaussian(index), &appearance.thinning) else { return Splat::INVISIBLE };
     let Some(projected) = project_with(gaussian, view, clip, scene.trained_with.marginal_cutoff) else {
         return Splat::INVISIBLE;
     };
     if !appearance.shows(projected.mean) {
         return Splat::INVISIBLE;
     }
-    let opacity = projected.opacity * appearance.opacity;
+    let opacity = appearance.thinning.boosted(projected.opacity * appearance.opacity);
     let seen = match scene.trained_with.sh_direction {
         ShDirection::Canonical => Vec3::from(gaussian.mean),
         ShDirection::Displaced => projected.mean,

@@ -111,6 +111,14 @@ pub struct InstanceUniforms {
     pub crop_y: [f32; 4],
     /// Row z.
     pub crop_z: [f32; 4],
+    /// Gaussians of at most this importance are not drawn, capture units; 0: all are drawn, unchanged.
+    pub least_importance: f32,
+    /// Factor on the covariances of the others.
+    pub growth: f32,
+    /// Power of the transmittance of the others.
+    pub boost: f32,
+    /// Unused.
+    pub padding: f32,
 }
 
 /// The view of one part of a capture in the previous frame. Input of `motion`.
@@ -183,6 +191,9 @@ impl InstanceUniforms {
             crop_x: crop.row(0).to_array(),
             crop_y: crop.row(1).to_array(),
             crop_z: crop.row(2).to_array(),
+            least_importance: appearance.thinning.least,
+            growth: appearance.thinning.growth,
+            boost: appearance.thinning.boost,
             camera_x: m.row(0).to_array(),
             camera_y: m.row(1).to_array(),
             camera_z: m.row(2).to_array(),

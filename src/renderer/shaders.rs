@@ -12,6 +12,7 @@ const LIBRARIES: &[Library] = &[
     ("types", include_str!("../../shaders/shared/types.wgsl")),
     ("records", include_str!("../../shaders/shared/records.wgsl")),
     ("conic", include_str!("../../shaders/shared/conic.wgsl")),
+    ("importance", include_str!("../../shaders/shared/importance.wgsl")),
     ("alpha", include_str!("../../shaders/shared/alpha.wgsl")),
     ("tile", include_str!("../../shaders/shared/tile.wgsl")),
     ("srgb", include_str!("../../shaders/shared/srgb.wgsl")),

@@ -5,6 +5,7 @@
 //! `shaders/shared/appearance.wgsl` computes it.
 
 use super::srgb::{decode, encode};
+use super::thinning::Thinning;
 use glam::{Affine3A, Vec3};
 
 /// The space in which splats are blended. Default: [`Encoded`](Self::Encoded).
@@ -58,7 +59,7 @@ pub enum Background {
     Environment,
 }
 
-/// How one placed capture is shown: opacity, light and crop.
+/// How one placed capture is shown: opacity, light, crop, and which Gaussians are drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Appearance {
     /// Factor on every opacity, from 0 to 1. Default: 1.
@@ -68,11 +69,13 @@ pub struct Appearance {
     /// Transforms capture space to a box from −1 to 1; Gaussians with means outside are not drawn. Default: `None`, no
     /// crop.
     pub crop: Option<Affine3A>,
+    /// The Gaussians that are drawn. Default: all.
+    pub thinning: Thinning,
 }
 
 impl Default for Appearance {
     fn default() -> Self {
-        Self { opacity: 1.0, light: Vec3::ONE, crop: None }
+        Self { opacity: 1.0, light: Vec3::ONE, crop: None, thinning: Thinning::default() }
     }
 }
 

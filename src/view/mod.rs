@@ -10,6 +10,7 @@ mod frame;
 mod optics;
 mod picture;
 pub mod srgb;
+mod thinning;
 #[expect(clippy::module_inception, reason = "the type `View` has its own file, like the other types")]
 mod view;
 
@@ -18,4 +19,5 @@ pub use camera::{Camera, Lens};
 pub use frame::{Counts, Frame};
 pub use optics::{NEAR, Optics, RasterFov};
 pub use picture::Picture;
+pub use thinning::Thinning;
 pub use view::{TILE_SIZE, View, tiles};

@@ -96,7 +96,7 @@ fn settings_limit_the_level() {
         stage.set(CaptureSettings { finest_level, ..default() });
         assert_eq!(stage.drawn_from(distance_of(100.0)), expected, "with the finest level {finest_level}");
     }
-    stage.app.insert_resource(CaptureDetail { bias: -1.5, ..default() });
+    stage.app.insert_resource(CaptureDetail { bias: -1.5 });
     assert_eq!(stage.drawn_from(distance_of(100.0)), 10, "with a bias of -1.5, 100 pixels count as 35");
     stage.app.insert_resource(CaptureDetail::default());
     assert_eq!(stage.drawn_from(distance_of(100.0)), 100, "without a bias, 100 pixels count as 100");
@@ -124,7 +124,7 @@ fn two_eyes_draw_the_same_level() {
 fn a_capture_without_levels_is_drawn_whole() {
     let Some(mut stage) = Stage::of(&heap(100)) else { return };
     stage.set(CaptureSettings { finest_level: 2, ..default() });
-    stage.app.insert_resource(CaptureDetail { bias: -4.0, ..default() });
+    stage.app.insert_resource(CaptureDetail { bias: -4.0 });
     assert_eq!(stage.drawn_from(distance_of(8.0)), 100, "all Gaussians are drawn");
 }
 
@@ -160,9 +160,9 @@ fn levels_of_the_bundled_capture_reach_45_db() {
         let distance = 2.0 * focal * bounds.radius() / (0.99 * pixels);
         let eye = bounds.center() + Vec3::new(0.5, -0.7, 0.4).normalize() * distance;
         insert(&mut app, camera, Transform::from_translation(eye).looking_at(bounds.center(), Vec3::Z));
-        app.insert_resource(CaptureDetail { bias: 16.0, ..default() });
+        app.insert_resource(CaptureDetail { bias: 16.0 });
         let all = picture(&mut app, 0.0);
-        app.insert_resource(CaptureDetail { bias: -0.4, ..default() });
+        app.insert_resource(CaptureDetail { bias: -0.4 });
         let level = picture(&mut app, 0.0);
         assert!(drawn(&app) < before, "a coarser level has fewer Gaussians: {}, the finer level {before}", drawn(&app));
         before = drawn(&app);

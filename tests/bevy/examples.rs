@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use tempfile::TempDir;
 
-const EXAMPLES: [&str; 6] = ["minimal", "play", "scene", "timeline", "walkthrough", "headless"];
+const EXAMPLES: [&str; 7] = ["minimal", "play", "scene", "timeline", "walkthrough", "headless", "budget"];
 
 /// Returns the path of an example: tests are in the folder `deps` next to `examples`.
 fn program(example: &str) -> PathBuf {
@@ -109,6 +109,11 @@ fn headless_writes_pictures() {
     draw("headless", &["--size", "200x120"], 2);
 }
 
+#[test]
+fn budget_writes_pictures() {
+    draw("budget", &["--size", "160x90", "--copies", "2", "--settle", "4"], 2);
+}
+
 /// Returns a folder with the assets of the crate, except that the captures are fully transparent. Their durations and
 /// bounds are unchanged.
 fn invisible() -> TempDir {
@@ -136,7 +141,8 @@ fn every_example_writes_pictures_that_show_its_captures_and_change() {
         let roots = [Path::new(ROOT), invisible.path()];
         // In the first picture the timeline's capture has not yet faded in.
         let frames = if example == "timeline" { 4 } else { 2 };
-        let [Some(seen), Some(unseen)] = roots.map(|root| pictures(root, example, &[], frames)) else { return };
+        let options: &[&str] = if example == "budget" { &["--settle", "2"] } else { &[] };
+        let [Some(seen), Some(unseen)] = roots.map(|root| pictures(root, example, options, frames)) else { return };
         check(example, &seen, frames);
         let fraction = differing(&seen[frames - 1], &unseen[frames - 1]);
         assert!(fraction > 0.01, "{example} shows its captures: without them {fraction} of the pixels differ");

@@ -7,6 +7,7 @@
 mod animation;
 mod app;
 mod assets;
+mod budget;
 mod colliders;
 mod composition;
 mod detail;

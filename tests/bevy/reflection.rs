@@ -49,6 +49,7 @@ fn reflected() -> Vec<(String, &'static str)> {
         bevy_gs4d::playback::SocketState,
         bevy_gs4d::playback::TimelinePlayer,
         bevy_gs4d::playback::TimelineTrack,
+        bevy_gs4d::render::CaptureBudget,
         bevy_gs4d::render::CaptureDetail,
         bevy_gs4d::render::CaptureSettings,
         bevy_gs4d::render::CaptureStatistics,

@@ -13,7 +13,7 @@ use bevy_gs4d::renderer::{Headless, Instance, OpaqueDepth, ViewParameters};
 use bevy_gs4d::scene::RuntimeScene;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::view::srgb::decode;
-use bevy_gs4d::view::{Appearance, Background, BlendSpace, Camera, DebugView, Frame, RasterFov, View};
+use bevy_gs4d::view::{Appearance, Background, BlendSpace, Camera, DebugView, Frame, RasterFov, Thinning, View};
 use glam::{Affine3A, Mat4, Quat, UVec2, Vec2, Vec3, Vec4};
 
 const SIZE: UVec2 = UVec2::new(192, 128);
@@ -37,6 +37,13 @@ fn blobs(blobs: &[(Vec3, f32, f32)]) -> RuntimeScene {
     let gaussian = |&(mean, deviation, opacity): &(Vec3, f32, f32)| blob(mean, Vec3::splat(deviation), opacity);
     let harmonics = Harmonics { coefficients: 1, degree: 0, degree_t: 0, values: vec![0.0; blobs.len() * 3] };
     RuntimeScene::sliced(blobs.iter().map(gaussian).collect(), harmonics)
+}
+
+/// Returns the importance that half of the Gaussians exceed.
+fn median_importance(scene: &RuntimeScene) -> f32 {
+    let mut all: Vec<f32> = scene.iter().map(|gaussian| gaussian.importance()).collect();
+    all.sort_unstable_by(f32::total_cmp);
+    all[all.len() / 2]
 }
 
 /// Draws one scene with an appearance, on the GPU and on the CPU.
@@ -95,11 +102,13 @@ fn appearances_match_the_cpu_reference() {
     let plain = both(&mut headless, &scene, view(), Appearance::default(), BlendSpace::Encoded);
     assert_same(&plain, "as trained");
     let crop = Affine3A::from_scale(Vec3::new(2.0, 1.5, 3.0)) * Affine3A::from_quat(Quat::from_rotation_y(0.4));
+    let thinning = Thinning::new(median_importance(&scene), 0.5);
     let looks = [
         ("half as opaque", Appearance { opacity: 0.5, ..Appearance::default() }),
         ("tinted and brighter", Appearance { light: Vec3::new(2.5, 1.0, 0.1), ..Appearance::default() }),
         ("cropped", Appearance { crop: Some(crop), ..Appearance::default() }),
-        ("all at once", Appearance { opacity: 0.7, light: Vec3::new(0.3, 1.4, 0.9), crop: Some(crop) }),
+        ("thinned", Appearance { thinning, ..Appearance::default() }),
+        ("all at once", Appearance { opacity: 0.7, light: Vec3::new(0.3, 1.4, 0.9), crop: Some(crop), thinning }),
     ];
     for (what, appearance) in looks {
         for space in [BlendSpace::Encoded, BlendSpace::Linear] {

@@ -88,7 +88,7 @@ impl Stage {
             self.app.world().resource::<AssetServer>().reload(self.file());
         }
         let bias = if state.coarse { -16.0 } else { 16.0 };
-        self.app.insert_resource(CaptureDetail { bias, ..default() });
+        self.app.insert_resource(CaptureDetail { bias });
         self.resize(state.size);
         self.show_captures(&state.captures);
         self.show_cameras(&state.cameras);

@@ -26,13 +26,15 @@ pub(super) fn show(ui: &mut egui::Ui, settings: CaptureSettings, bounds: Option<
         }
         ui.label("tint");
         if ui.button("as trained").clicked() {
-            let CaptureSettings { filter, crop, finest_level, antialias, .. } = edited;
-            edited = CaptureSettings { filter, crop, finest_level, antialias, ..CaptureSettings::default() };
+            let CaptureSettings { opacity, tint, exposure, .. } = CaptureSettings::default();
+            edited = CaptureSettings { opacity, tint, exposure, ..edited };
         }
     });
     ui.checkbox(&mut edited.antialias, "anti-aliased");
     let levels = Slider::new(&mut edited.finest_level, 0..=MAX_LEVELS as u8).clamping(SliderClamping::Edits);
     ui.add(levels.text("finest level"));
+    let priority = Slider::new(&mut edited.priority, 0.1..=10.0).logarithmic(true).clamping(SliderClamping::Edits);
+    ui.add(priority.text("priority in the budget"));
     let mut cropped = edited.crop.is_some();
     if ui.checkbox(&mut cropped, "crop box").changed() {
         edited.crop = cropped.then(|| crop_around(bounds));
@@ -75,6 +77,7 @@ mod tests {
             exposure: -20.123_4,
             crop: Some(crop),
             finest_level: 3,
+            priority: 0.012_3,
             antialias: false,
         };
         let context = egui::Context::default();

@@ -233,7 +233,7 @@ impl Subject<'_, '_> {
         section(ui, "counts", true, |ui| counts::show(ui, view.as_ref(), frame_seconds));
         section(ui, "memory", false, |ui| memory::show(ui, &self.statistics, view.as_ref()));
         section(ui, "GPU time", false, |ui| match &view {
-            Some(view) if view.total > 0 => timing::show(ui, &view.passes, measuring),
+            Some(view) if view.total > 0 => timing::show(ui, &view.passes, self.statistics.cut(), measuring),
             _ => {
                 ui.weak("this view draws no capture");
             }

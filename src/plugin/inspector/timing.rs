@@ -1,6 +1,6 @@
 //! The section "GPU time": the time of each pass.
 //!
-//! In: whether the section is open, the measured passes. Out: bars. Measuring is on only while the section is open,
+//! In: whether the section is open, the measured passes, the size below which a budget leaves out Gaussians. Out: bars. Measuring is on only while the section is open,
 //! because it takes time itself.
 
 use super::counts::bar;
@@ -30,7 +30,7 @@ impl Measuring {
 }
 
 /// Draws the section of a view that draws captures.
-pub(super) fn show(ui: &mut egui::Ui, passes: &[PassTime], measuring: &mut Measuring) {
+pub(super) fn show(ui: &mut egui::Ui, passes: &[PassTime], cut: f32, measuring: &mut Measuring) {
     if passes.is_empty() {
         measuring.waited = measuring.waited.saturating_add(1);
         let waits = measuring.waited <= MOST_FRAMES_WAITED;
@@ -42,6 +42,9 @@ pub(super) fn show(ui: &mut egui::Ui, passes: &[PassTime], measuring: &mut Measu
         bar(ui, fraction(pass.milliseconds, sum), format!("{}: {:.3} ms", pass.name, pass.milliseconds));
     }
     ui.label(format!("sum: {sum:.3} ms"));
+    if cut > 0.0 {
+        ui.label(format!("budget: left out below {cut:.3} px"));
+    }
 }
 
 #[cfg(test)]

@@ -10,6 +10,7 @@
 //! extract      captures, their times, poses and settings             main world -> render world
 //! upload       a loaded capture -> buffers on the GPU                once per asset, over several frames
 //! detail       level of detail by the size on the screen             once per camera, placed capture and frame
+//! budget       the Gaussians left out to keep the time               once per frame, for all views
 //! active       the lists of active Gaussians                         once per placed capture and segment
 //! prepare      a camera's lens and the poses of captures -> views    once per camera and frame, into capture_views
 //! order        transparent items before and after captures           once per camera and frame
@@ -90,6 +91,9 @@ pub(crate) mod views;
 
 #[cfg(feature = "pbr")]
 pub(crate) use captures::active::ActiveLists;
+pub use captures::budget::CaptureBudget;
+#[cfg(feature = "pbr")]
+pub(crate) use captures::budget::CaptureCut;
 pub use captures::detail::CaptureDetail;
 #[cfg(feature = "pbr")]
 pub(crate) use captures::extract::{ExtractedCaptures, extract_captures};

@@ -4,6 +4,7 @@
 
 use super::captures::active::{ActiveLists, any_stale, prepare_active_lists, record_active_lists};
 use super::captures::back_off::BackOff;
+use super::captures::budget::{CaptureBudget, CaptureCut, any_budget, extract_budget, steer_cut};
 use super::captures::detail::{CaptureDetail, CaptureLevels, any_levels, choose_levels, extract_detail};
 use super::captures::extract::{
     ExtractedCaptures, ExtractedViewSettings, any_view_settings, extract_captures, extract_view_settings, has_changed,
@@ -80,6 +81,7 @@ fn add(app: &mut App) {
     app.init_resource::<CaptureStatistics>()
         .init_resource::<CaptureUploadBudget>()
         .init_resource::<CaptureDetail>()
+        .init_resource::<CaptureBudget>()
         .register_required_components::<GaussianCapture3d, CaptureSettings>()
         .add_systems(PostUpdate, update_bounds.in_set(VisibilitySystems::CalculateBounds));
     build_rendering(app);
@@ -105,6 +107,8 @@ fn build_rendering(app: &mut App) {
         .init_resource::<CaptureUploadBudget>()
         .init_resource::<CaptureDetail>()
         .init_resource::<CaptureLevels>()
+        .init_resource::<CaptureBudget>()
+        .init_resource::<CaptureCut>()
         .init_resource::<ExtractedCaptures>()
         .init_resource::<ExtractedViewSettings>()
         .init_resource::<ShadeRequests>()
@@ -131,6 +135,7 @@ fn build_rendering(app: &mut App) {
                 extract_depth_readers,
                 extract_upload_budget.run_if(has_changed::<CaptureUploadBudget>),
                 extract_detail.run_if(has_changed::<CaptureDetail>),
+                extract_budget,
             ),
         )
         .add_systems(
@@ -146,7 +151,7 @@ fn build_rendering(app: &mut App) {
                     .run_if(any_ordered)
                     .in_set(RenderSystems::Prepare)
                     .before(RenderSystems::PrepareResources),
-                (choose_levels.run_if(any_levels), prepare_active_lists)
+                (steer_cut.run_if(any_budget), choose_levels.run_if(any_levels), prepare_active_lists)
                     .chain()
                     .in_set(RenderSystems::PrepareResources),
                 prepare_views.in_set(RenderSystems::PrepareBindGroups),

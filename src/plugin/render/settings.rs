@@ -3,7 +3,7 @@
 //! In: fields that any system or animation may set. Out: an [`Appearance`] for the renderer, the settings of a camera.
 
 use crate::renderer::Design;
-use crate::view::{Appearance, BlendSpace, DebugView};
+use crate::view::{Appearance, BlendSpace, DebugView, Thinning};
 use bevy::color::LinearRgba;
 use bevy::ecs::component::Component;
 use bevy::ecs::reflect::ReflectComponent;
@@ -47,6 +47,9 @@ pub struct CaptureSettings {
     /// The finest level of detail that is drawn, if the capture has levels: 0 is all Gaussians, 1 the first level with
     /// fewer Gaussians; a number above the coarsest level selects the coarsest. Default: 0.
     pub finest_level: u8,
+    /// Factor on the size of its Gaussians where a [`CaptureBudget`](super::CaptureBudget) leaves out the smallest: at 2
+    /// its detail is that of a capture at half the distance; at infinity all of its Gaussians are drawn. Default: 1.
+    pub priority: f32,
     /// Whether Gaussians are anti-aliased: where they are smaller on the screen than in training, they are drawn
     /// fainter, so that they cover no more than in training. Without anti-aliasing, distant Gaussians appear too large.
     /// Needs the size of training pixels, which `gs4d bake` and `gs4d detail --data` write into the package; captures
@@ -156,7 +159,16 @@ pub enum DepthWrite {
 impl Default for CaptureSettings {
     fn default() -> Self {
         let tint = LinearRgba::WHITE;
-        Self { filter: true, opacity: 1.0, tint, exposure: 0.0, crop: None, finest_level: 0, antialias: true }
+        Self {
+            filter: true,
+            opacity: 1.0,
+            tint,
+            exposure: 0.0,
+            crop: None,
+            finest_level: 0,
+            priority: 1.0,
+            antialias: true,
+        }
     }
 }
 
@@ -168,7 +180,7 @@ impl Default for CropBox {
 }
 
 impl CaptureSettings {
-    /// Returns the settings for the renderer. `fade` is a further factor on opacity.
+    /// Returns the settings for the renderer, without thinning. `fade` is a further factor on opacity.
     pub(crate) fn appearance(&self, fade: f32) -> Appearance {
         let stops = self.exposure.exp2();
         let light = [self.tint.red, self.tint.green, self.tint.blue].map(|channel| number(channel * stops));
@@ -176,6 +188,7 @@ impl CaptureSettings {
             opacity: number(self.opacity * fade),
             light: Vec3::from(light),
             crop: self.crop.and_then(|crop| crop.cube_from_capture()),
+            thinning: Thinning::default(),
         }
     }
 }

@@ -39,10 +39,13 @@ pub struct CaptureStatistics(Arc<Mutex<Shared>>);
 struct Shared {
     measure: bool,
     measure_for_panel: bool,
+    measure_for_budget: bool,
     views: Vec<(Entity, ViewStatistics)>,
     capture_bytes: u64,
     uploaded_captures: usize,
     uploading_captures: usize,
+    /// In pixels.
+    cut: f32,
     renderer_missing: Option<String>,
     /// Kept when the renderer is created again after a lost device.
     work: WorkCounters,
@@ -59,6 +62,30 @@ impl CaptureStatistics {
     #[cfg(feature = "inspector")]
     pub(crate) fn measure_for_panel(&self, on: bool) {
         self.lock().measure_for_panel = on;
+    }
+
+    /// Starts or stops measuring for a [`CaptureBudget`](super::CaptureBudget).
+    pub(super) fn measure_for_budget(&self, on: bool) {
+        self.lock().measure_for_budget = on;
+    }
+
+    /// Returns the size on the screen up to which Gaussians are left out to keep a
+    /// [`CaptureBudget`](super::CaptureBudget), in pixels: [importance](crate::gaussian::Gaussian::importance), which is
+    /// opacity squared times extent, at a typical depth of each capture. 0 while all Gaussians are drawn.
+    pub fn cut(&self) -> f32 {
+        self.lock().cut
+    }
+
+    pub(super) fn set_cut(&self, pixels: f32) {
+        self.lock().cut = pixels;
+    }
+
+    /// Returns the GPU time of captures in the newest measured frame, summed over all cameras, in seconds; 0 if it has
+    /// not been measured.
+    pub(super) fn gpu_seconds(&self) -> f32 {
+        let milliseconds =
+            self.lock().views.iter().flat_map(|(_, view)| &view.passes).map(|pass| pass.milliseconds).sum::<f64>();
+        (milliseconds * 1e-3) as f32
     }
 
     /// Returns the statistics of one camera, by its entity in the main world; `None` while it sees no capture and holds
@@ -103,7 +130,7 @@ impl CaptureStatistics {
 
     pub(crate) fn is_measuring(&self) -> bool {
         let shared = self.lock();
-        shared.measure || shared.measure_for_panel
+        shared.measure || shared.measure_for_panel || shared.measure_for_budget
     }
 
     /// Replaces the numbers by those of a new frame: the statistics of each camera that sees captures or holds memory

@@ -11,12 +11,12 @@ use crate::plugin::render::captures::back_off::BackOff;
 use crate::plugin::render::logged::{error_once_each, warn_once_each};
 use crate::plugin::render::targets::checked_pipelines::CheckedPipelines;
 use crate::plugin::render::{
-    ActiveLists, CaptureRenderer, Drawn, ExtractedCaptures, GpuGaussianCapture, WriteDepthKey, WriteDepthPipeline,
-    WrittenDepth, group_copies,
+    ActiveLists, CaptureCut, CaptureRenderer, Drawn, ExtractedCaptures, GpuGaussianCapture, WriteDepthKey,
+    WriteDepthPipeline, WrittenDepth, group_copies,
 };
 use crate::renderer::device::memory::catch_known;
 use crate::renderer::{ColorPrecision, GpuError, Instance, ViewParameters};
-use crate::view::{Background, BlendSpace, DebugView};
+use crate::view::{Appearance, Background, BlendSpace, DebugView};
 use bevy::camera::primitives::Frustum;
 use bevy::camera::visibility::RenderLayers;
 use bevy::ecs::query::With;
@@ -48,6 +48,7 @@ pub(super) struct Casters<'w> {
     extracted: Res<'w, ExtractedCaptures>,
     captures: Res<'w, RenderAssets<GpuGaussianCapture>>,
     lists: Res<'w, ActiveLists>,
+    cut: Res<'w, CaptureCut>,
 }
 
 impl Casters<'_> {
@@ -69,7 +70,9 @@ impl Casters<'_> {
         let view = lens.view(size, time, &caster.bounds, caster.world_from_capture, caster.bias)?;
         let level = usize::from(placed.finest_level).min(capture.coarsest());
         let view = view.with_optics(capture.optics(level, false)?);
-        let (asset, appearance, filtered) = (placed.asset, placed.appearance, placed.filtered);
+        let thinning = self.cut.thinning(&view, &capture.thinned(level)?, placed.priority);
+        let (asset, appearance) = (placed.asset, Appearance { thinning, ..placed.appearance });
+        let filtered = placed.filtered;
         Some(Drawn { entity: caster.entity, asset, view, appearance, filtered, level })
     }
 }

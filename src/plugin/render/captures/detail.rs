@@ -7,7 +7,6 @@
 use super::extract::ExtractedCaptures;
 use super::upload::GpuGaussianCapture;
 use crate::plugin::component::GaussianCapture3d;
-use crate::plugin::render::statistics::CaptureStatistics;
 use crate::scene::detail::pixels_across;
 use crate::scene::{Bounds, Level};
 use bevy::camera::{Camera3d, MainPassResolutionOverride};
@@ -25,7 +24,6 @@ use bevy::render::render_asset::RenderAssets;
 use bevy::render::sync_world::{MainEntity, MainEntityHashMap};
 use bevy::render::view::{ExtractedView, RenderVisibleEntities};
 use glam::{Affine3A, Mat4, UVec2, Vec3, Vec4};
-use std::time::Duration;
 
 /// A coarser level is chosen at a size on the screen below this factor times its limit, and left at the limit itself.
 const SLACK: f32 = 0.8;
@@ -33,32 +31,23 @@ const SLACK: f32 = 0.8;
 const ALIKE: f32 = 1.1;
 /// The same ratio for cameras that drew the same level in the previous frame: larger, so that levels do not flicker.
 const STILL_ALIKE: f32 = 1.2;
-/// Change of the bias per frame while the GPU time is off target, in stops.
-const STEP: f32 = 1.0 / 64.0;
-/// The bias rises while the target time is more than this many times the measured time: a finer level has seven times
-/// as many Gaussians and must not exceed the target again.
-const HEADROOM: f64 = 8.0;
-/// The lowest bias is minus this many stops.
-const FARTHEST: f32 = 6.0;
-
 /// The detail at which captures are drawn: a resource.
 ///
 /// Captures with levels of detail (`gs4d detail`) are drawn with fewer Gaussians where they are small on the screen.
-/// [`CaptureSettings::finest_level`](crate::plugin::render::CaptureSettings::finest_level) limits the detail of one capture.
+/// [`CaptureSettings::finest_level`](crate::plugin::render::CaptureSettings::finest_level) limits the detail of one capture,
+/// [`CaptureBudget`](crate::plugin::render::CaptureBudget) the time of all of them.
 ///
 /// # Examples
 ///
 /// ```
 /// use bevy::prelude::*;
 /// use bevy_gs4d::prelude::*;
-/// use std::time::Duration;
 ///
-/// /// Lowers the detail on a slow GPU until captures take at most four milliseconds.
-/// fn hurry(mut detail: ResMut<CaptureDetail>, statistics: Res<CaptureStatistics>) {
-///     statistics.measure(true);
-///     detail.frame_time = Some(Duration::from_millis(4));
+/// /// Counts every capture as half as large as it is.
+/// fn coarser(mut detail: ResMut<CaptureDetail>) {
+///     detail.bias = -1.0;
 /// }
-/// # bevy::ecs::system::assert_is_system(hurry);
+/// # bevy::ecs::system::assert_is_system(coarser);
 /// ```
 #[derive(Resource, Reflect, Debug, Clone, Copy, Default, PartialEq)]
 #[reflect(Resource, Default, Debug, Clone, PartialEq)]
@@ -67,11 +56,6 @@ pub struct CaptureDetail {
     /// Bias on the size on the screen, in stops: at −1 captures count as half as large, so that coarser levels are
     /// drawn; at 1 as twice as large. Default: 0, as measured when the levels were made.
     pub bias: f32,
-    /// Target of the GPU time of captures per frame, summed over all cameras. While it is exceeded, the bias falls
-    /// slowly below [`bias`](Self::bias); it rises again when the measured time is below an eighth of the target. Needs
-    /// [`CaptureStatistics::measure`], and a GPU with timestamps: without timestamps the target has no effect.
-    /// Timestamps inside passes, which some GPUs lack, are not needed. Default: `None`, no limit.
-    pub frame_time: Option<Duration>,
 }
 
 /// The level of each capture that has levels, for each camera that sees it. Level 0 is all Gaussians.
@@ -84,8 +68,6 @@ pub(in crate::plugin::render) struct CaptureLevels {
     whole: MainEntityHashMap<bool>,
     /// The sights of this frame. The memory is kept from frame to frame.
     sights: Vec<Sight>,
-    /// Added to the bias to meet the target time, in stops: at most 0.
-    steered: f32,
 }
 
 impl CaptureLevels {
@@ -97,17 +79,6 @@ impl CaptureLevels {
     /// Returns whether cameras see a capture, but no camera draws all of its Gaussians.
     pub(in crate::plugin::render) fn is_coarse(&self, capture: &MainEntity) -> bool {
         self.whole.get(capture) == Some(&false)
-    }
-
-    /// Updates `steered` towards the target time. It stays the same while no pass is measured.
-    fn steer(&mut self, wanted: Option<Duration>, statistics: &CaptureStatistics) {
-        let Some(wanted) = wanted else {
-            self.steered = 0.0;
-            return;
-        };
-        let views = statistics.views();
-        let milliseconds: f64 = views.iter().flat_map(|(_, view)| &view.passes).map(|pass| pass.milliseconds).sum();
-        self.steered = steered(self.steered, milliseconds, wanted.as_secs_f64() * 1e3);
     }
 }
 
@@ -137,17 +108,6 @@ impl Sight {
     }
 }
 
-/// Returns the bias of the next frame after a frame of so many milliseconds; 0 stands for an unmeasured frame.
-fn steered(before: f32, milliseconds: f64, wanted: f64) -> f32 {
-    if milliseconds > wanted {
-        (before - STEP).max(-FARTHEST)
-    } else if milliseconds > 0.0 && milliseconds * HEADROOM < wanted {
-        (before + STEP).min(0.0)
-    } else {
-        before
-    }
-}
-
 /// Copies the resource to the render world.
 pub(in crate::plugin::render) fn extract_detail(
     mut extracted: ResMut<CaptureDetail>,
@@ -172,17 +132,15 @@ pub(in crate::plugin::render) fn choose_levels(
     extracted: Res<ExtractedCaptures>,
     captures: Res<RenderAssets<GpuGaussianCapture>>,
     detail: Res<CaptureDetail>,
-    statistics: Res<CaptureStatistics>,
     cameras: Query<CameraSize, With<Camera3d>>,
     mut levels: ResMut<CaptureLevels>,
 ) {
     let _span = debug_span!("gs4d/detail").entered();
     let levels = &mut *levels;
-    levels.steer(detail.frame_time, &statistics);
     levels.whole.clear();
     levels.sights.clear();
     levels.chosen.values_mut().for_each(|(_, seen)| *seen = false);
-    let factor = (detail.bias + levels.steered).exp2();
+    let factor = detail.bias.exp2();
     for (camera, view, visible, resolution) in &cameras {
         let size = resolution.map_or(UVec2::new(view.viewport.z, view.viewport.w), |smaller| smaller.0);
         let eye = Vec3::from(view.world_from_view.affine().translation);
@@ -333,35 +291,6 @@ mod tests {
             near = 103.5 - near;
         }
         assert_eq!((chosen, changes), ([Some(0), Some(0)], 1), "both cameras change once, to the finer level");
-    }
-
-    #[test]
-    fn the_bias_follows_the_gpu_time() {
-        assert!(steered(0.0, 5.0, 4.0) < 0.0, "the bias falls above the target time");
-        assert!(steered(-1.0, 0.4, 4.0) > -1.0, "the bias rises far below the target time");
-        assert_eq!(steered(-1.0, 3.9, 4.0), -1.0, "the bias is kept at the target time");
-        assert_eq!(
-            steered(-1.0, 0.6, 4.0),
-            -1.0,
-            "the bias is kept if a level with seven times as many Gaussians would exceed the target"
-        );
-        assert_eq!(steered(-1.0, 0.0, 4.0), -1.0, "the bias is kept without a measurement");
-        assert_eq!(steered(0.0, 1.0, 4.0), 0.0, "the bias does not rise above 0");
-        assert_eq!(steered(-FARTHEST, 9.0, 4.0), -FARTHEST, "the bias does not fall below its minimum");
-    }
-
-    #[test]
-    fn the_level_settles_under_a_time_limit() {
-        let levels = levels(&[100.0, 40.0]);
-        // All Gaussians take 5 ms, each level a seventh of the time of the finer level.
-        let (mut bias, mut level, mut changes) = (0.0, 0, 0);
-        for _ in 0..2000 {
-            bias = steered(bias, 5.0 / 7f64.powi(level as i32), 4.0);
-            let next = choose(&levels, 110.0 * f32::exp2(bias), Some(level));
-            changes += usize::from(next != level);
-            level = next;
-        }
-        assert_eq!((level, changes), (1, 1), "one change to a coarser level, then none");
     }
 
     #[test]

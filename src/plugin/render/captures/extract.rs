@@ -36,11 +36,14 @@ pub(crate) struct ExtractedCapture {
     pub(crate) seconds: f32,
     /// Whether its temporal filter is used.
     pub(crate) filtered: bool,
+    /// Without thinning, which depends on the view.
     pub(crate) appearance: Appearance,
     /// Whether its Gaussians are anti-aliased; see [`CaptureSettings::antialias`].
     pub(in crate::plugin::render) antialias: bool,
     /// The finest level of detail that is drawn.
     pub(crate) finest_level: u8,
+    /// Its priority in the budget.
+    pub(crate) priority: f32,
     /// Whether any camera sees it, or may see its shadow.
     pub(crate) seen: bool,
     /// Whether it casts shadows.
@@ -93,6 +96,7 @@ pub(crate) fn extract_captures(
             antialias: settings.antialias,
             appearance: settings.appearance(fade.copied().unwrap_or_default().0),
             finest_level: settings.finest_level,
+            priority: settings.priority,
             seen: visibility.get(),
             casts: false,
         };

@@ -1,13 +1,16 @@
 //! Captures on the GPU, before any camera looks at them.
 //!
-//! In: entities with captures, their times, poses and settings. Out: buffers on the GPU, the list of active Gaussians and
-//! the level of detail of each placed capture.
+//! In: entities with captures, their times, poses and settings. Out: buffers on the GPU, the list of active Gaussians, the
+//! level of detail and the thinning of each placed capture.
 
 pub(crate) mod active;
 pub(crate) mod back_off;
+pub(crate) mod budget;
 pub(crate) mod detail;
 pub(crate) mod extract;
+mod importances;
 pub(crate) mod previous;
+mod steering;
 pub(crate) mod upload;
 pub(crate) mod view;
 pub(crate) mod visibility;

@@ -5,6 +5,8 @@
 //! until the new one is complete, and kept if the GPU rejects the new one: if it refuses a buffer, has no memory for
 //! it, or no view could draw the capture.
 
+use super::budget::ThinnedCapture;
+use super::importances::Importances;
 use crate::plugin::asset::{CaptureFailure, Uploads};
 use crate::plugin::component::GaussianCapture;
 use crate::plugin::render::renderer::CaptureRenderer;
@@ -68,6 +70,8 @@ pub struct GpuGaussianCapture {
 struct ShownCapture {
     /// All Gaussians, then each level of detail.
     levels: Vec<GpuCapture>,
+    /// Those of each of the levels.
+    importances: Vec<Importances>,
     /// The source of these buffers, which may be older than the asset.
     source: GaussianCapture,
 }
@@ -76,6 +80,7 @@ struct ShownCapture {
 struct NextCapture {
     /// All Gaussians, then each level of detail.
     uploads: Vec<CaptureUpload<Arc<RuntimeScene>>>,
+    importances: Vec<Importances>,
     source: GaussianCapture,
     /// Error scopes of the buffers, without results yet, as in browsers. Nothing is drawn until these arrive.
     pending: Option<Caught>,
@@ -93,6 +98,7 @@ impl NextCapture {
         let whole = source.shared_scene();
         let needed = whole.size() as u64;
         let levels = whole.levels.iter().map(|level| level.scene.clone()).collect::<Vec<_>>();
+        let importances = std::iter::once(&whole).chain(&levels).map(|scene| Importances::of(scene)).collect();
         let upload = |scene| CaptureUpload::new(device, &renderer.0, scene);
         let create = || std::iter::once(whole).chain(levels).map(upload).collect::<Result<Vec<_>, _>>();
         let (created, mut caught) = catch(device, needed, create);
@@ -105,7 +111,7 @@ impl NextCapture {
         let mut rooms = uploads.iter().map(|upload| ViewRenderer::check_room(device, upload.most_drawn()));
         rooms.next_back().unwrap_or(Ok(()))?;
         let passes = renderer.0.begin_ahead(device, Storage::of(&source.scene().form));
-        Ok(Self { uploads, source, pending, passes })
+        Ok(Self { uploads, importances, source, pending, passes })
     }
 
     /// Returns whether the capture can be drawn.
@@ -131,6 +137,13 @@ impl GpuGaussianCapture {
     pub(in crate::plugin::render) fn level(&self, index: usize) -> Option<&GpuCapture> {
         let levels = &self.shown.as_ref()?.levels;
         levels.get(index).or(levels.first())
+    }
+
+    /// Returns what decides about the Gaussians that are left out of a level of detail; `None` as for its buffers.
+    pub(crate) fn thinned(&self, index: usize) -> Option<ThinnedCapture<'_>> {
+        let ShownCapture { importances, source, .. } = &**self.shown.as_ref()?;
+        let importances = importances.get(index).or(importances.first())?;
+        Some(ThinnedCapture { importances, bounds: source.bounds() })
     }
 
     /// Returns the levels of detail and the bounds over all times of the drawn capture; `None` if it has no levels.
@@ -198,7 +211,7 @@ impl GpuGaussianCapture {
             if source.usages() == RenderAssetUsages::RENDER_WORLD {
                 source.release();
             }
-            self.shown = Some(Arc::new(ShownCapture { levels, source }));
+            self.shown = Some(Arc::new(ShownCapture { levels, importances: next.importances, source }));
         }
         Ok(written)
     }

@@ -13,6 +13,7 @@ use super::shade_requests::ShadeRequests;
 use crate::plugin::component::GaussianCapture3d;
 use crate::plugin::render::captures::active::ActiveLists;
 use crate::plugin::render::captures::back_off::BackOff;
+use crate::plugin::render::captures::budget::CaptureCut;
 use crate::plugin::render::captures::detail::CaptureLevels;
 use crate::plugin::render::captures::extract::{ExtractedCaptures, ExtractedViewSettings};
 use crate::plugin::render::captures::previous::{CameraPose, PreviousCaptures};
@@ -29,7 +30,7 @@ use crate::plugin::render::targets::write_depth::{WriteDepthKey, WriteDepthPipel
 use crate::plugin::render::targets::write_motion::{WriteMotionKey, WriteMotionPipeline};
 use crate::renderer::device::memory::{catch, catch_known};
 use crate::renderer::{ColorPrecision, GpuError, OpaqueDepth, ViewParameters};
-use crate::view::{Background, DebugView, View};
+use crate::view::{Appearance, Background, DebugView, View};
 use bevy::camera::{Camera3d, CompositingSpace, MainPassResolutionOverride};
 use bevy::core_pipeline::prepass::ViewPrepassTextures;
 use bevy::ecs::entity::{Entities, Entity};
@@ -54,6 +55,7 @@ pub(in crate::plugin::render) struct Scene<'w> {
     previous: ResMut<'w, PreviousCaptures>,
     depth_readers: Res<'w, DepthReaders>,
     levels: Res<'w, CaptureLevels>,
+    cut: Res<'w, CaptureCut>,
 }
 
 /// The pipelines that depend on a camera's target.
@@ -89,7 +91,9 @@ impl Scene<'_> {
             let level = self.levels.of(viewer, *entity);
             let optics = capture.optics(level, placed.antialias)?;
             let view = lens.view(size, time, camera, placed.world_from_capture)?.with_optics(optics);
-            let (asset, appearance, filtered) = (placed.asset, placed.appearance, placed.filtered);
+            let thinning = self.cut.thinning(&view, &capture.thinned(level)?, placed.priority);
+            let (asset, appearance) = (placed.asset, Appearance { thinning, ..placed.appearance });
+            let filtered = placed.filtered;
             Some(Drawn { entity: *entity, asset, view, appearance, filtered, level })
         }));
         group_copies(drawn);

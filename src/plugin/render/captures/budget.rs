@@ -1,0 +1,235 @@
+//! Budget: leaves out Gaussians that are small on the screen while captures take more time than the game gives them.
+//!
+//! In: [`CaptureBudget`], the GPU times of [`CaptureStatistics`], the time of the frame; for each capture in a view, its
+//! [`Importances`] and its place. Out: the [`Thinning`] of each capture in each view, which changes slowly.
+
+use super::importances::Importances;
+use super::steering::Steering;
+use crate::plugin::render::statistics::CaptureStatistics;
+use crate::scene::Bounds;
+use crate::view::{Thinning, View};
+use bevy::ecs::reflect::ReflectResource;
+use bevy::ecs::resource::Resource;
+use bevy::ecs::system::{Res, ResMut};
+use bevy::log::debug_span;
+use bevy::reflect::Reflect;
+use bevy::reflect::std_traits::ReflectDefault;
+use bevy::render::Extract;
+use bevy::time::{Real, Time};
+use glam::{Mat3, Vec2};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// The time that captures may take in a frame, all captures and cameras together: a resource.
+///
+/// While they take longer, the Gaussians that matter least to the picture are left out, in all views: those that are
+/// small on the screen or faint, so that far captures become coarser first. Those that are left grow and become more
+/// opaque, to fill the gaps. The limit moves slowly and Gaussians fade, so that nothing flickers; when there is time
+/// again, all of them return. While frames are short enough, pictures are those without a budget, bit for bit.
+///
+/// [`CaptureSettings::priority`](crate::plugin::render::CaptureSettings::priority) keeps the detail of one capture.
+/// [Levels of detail](crate::plugin::render::CaptureDetail) are chosen independently, by size. Shadows of captures are
+/// thinned too, but their time is not part of [`gpu_time`](Self::gpu_time).
+///
+/// # Examples
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_gs4d::prelude::*;
+/// use std::time::Duration;
+///
+/// fn setup(mut commands: Commands) {
+///     // Four milliseconds of the GPU, on every GPU.
+///     let gpu_time = Some(Duration::from_millis(4));
+///     commands.insert_resource(CaptureBudget { gpu_time, ..default() });
+/// }
+/// # bevy::ecs::system::assert_is_system(setup);
+/// ```
+#[derive(Resource, Reflect, Debug, Clone, Copy, PartialEq)]
+#[reflect(Resource, Default, Debug, Clone, PartialEq)]
+#[type_path = "bevy_gs4d::render"]
+pub struct CaptureBudget {
+    /// GPU time of the captures of a frame, summed over all cameras. It is measured, also while
+    /// [`CaptureStatistics::measure`] is off; on a GPU without timestamps it has no effect. Default: `None`, no limit.
+    pub gpu_time: Option<Duration>,
+    /// Time from a frame to the next, of the whole game, for GPUs without timestamps. With vertical synchronization,
+    /// choose a little more than the time between two refreshes: a frame never takes less than that. If both times are
+    /// given, both are kept. Default: `None`, no limit.
+    pub frame_time: Option<Duration>,
+    /// The smallest share of the Gaussians of a capture that is drawn, from 0 to 1; a capture is drawn with these even
+    /// if the time is exceeded. Default: 1/16.
+    pub least_share: f32,
+}
+
+impl Default for CaptureBudget {
+    fn default() -> Self {
+        Self { gpu_time: None, frame_time: None, least_share: 1.0 / 16.0 }
+    }
+}
+
+impl CaptureBudget {
+    /// Returns whether there is a limit.
+    fn is_limited(&self) -> bool {
+        self.gpu_time.is_some() || self.frame_time.is_some()
+    }
+}
+
+/// The size on the screen below which Gaussians are left out, for all views.
+#[derive(Resource, Default)]
+pub(crate) struct CaptureCut {
+    steering: Steering,
+    /// Time of the newest frame of the game, seconds.
+    frame_seconds: f32,
+    least_share: f32,
+    /// Whether any capture could be drawn with fewer Gaussians in this frame.
+    can_fall: AtomicBool,
+}
+
+impl CaptureCut {
+    /// Returns the Gaussians of a capture that are drawn in a view, at this priority.
+    pub(crate) fn thinning(&self, view: &View, thinned: &ThinnedCapture<'_>, priority: f32) -> Thinning {
+        let pixels = self.steering.pixels();
+        if priority == f32::INFINITY {
+            return Thinning::default();
+        }
+        if pixels == 0.0 {
+            self.can_fall.store(true, Ordering::Relaxed);
+            return Thinning::default();
+        }
+        // A priority that is negative or not a number counts as 0: the smallest share.
+        let wanted = pixels / (pixels_per_unit(view, thinned.bounds) * priority.max(0.0));
+        let most = thinned.importances.least_of(self.least_share);
+        if wanted < most {
+            self.can_fall.store(true, Ordering::Relaxed);
+        }
+        let least = wanted.min(most);
+        Thinning::new(least, thinned.importances.share_above(least))
+    }
+}
+
+/// What [`CaptureCut::thinning`] needs to know of a capture.
+pub(crate) struct ThinnedCapture<'a> {
+    /// Of the level of detail that is drawn.
+    pub(in crate::plugin::render) importances: &'a Importances,
+    /// Over all times, capture space; `None` if they are not known.
+    pub(in crate::plugin::render) bounds: Option<Bounds>,
+}
+
+/// Returns how many pixels a unit of the capture has in a view, at a typical depth.
+fn pixels_per_unit(view: &View, bounds: Option<Bounds>) -> f32 {
+    let scale = Mat3::from_mat4(view.world_to_camera).determinant().abs().cbrt();
+    let focal = 0.5 * view.size.as_vec2() * Vec2::new(view.projection.x, view.projection.y).abs();
+    let focal = (focal.x * focal.y).sqrt() * scale;
+    if view.orthographic {
+        return focal;
+    }
+    // A camera inside the capture sees most of it at the distance of its bounds.
+    let (center, radius) = bounds.map_or((glam::Vec3::ZERO, 1.0), |bounds| (bounds.center(), bounds.radius()));
+    focal / view.world_to_camera.transform_point3(center).length().hypot(radius * scale)
+}
+
+/// Copies the resource and the time of the frame to the render world.
+pub(in crate::plugin::render) fn extract_budget(
+    mut extracted: ResMut<CaptureBudget>,
+    mut cut: ResMut<CaptureCut>,
+    budget: Extract<Res<CaptureBudget>>,
+    time: Extract<Option<Res<Time<Real>>>>,
+) {
+    *extracted = **budget;
+    cut.frame_seconds = time.as_ref().map_or(0.0, |time| time.delta_secs());
+}
+
+/// Returns whether there is a budget, or was one in the previous frame.
+pub(in crate::plugin::render) fn any_budget(budget: Res<CaptureBudget>, cut: Res<CaptureCut>) -> bool {
+    budget.is_limited() || cut.steering != Steering::default()
+}
+
+/// Changes the size below which Gaussians are left out.
+pub(in crate::plugin::render) fn steer_cut(
+    budget: Res<CaptureBudget>,
+    statistics: Res<CaptureStatistics>,
+    mut cut: ResMut<CaptureCut>,
+) {
+    let _span = debug_span!("gs4d/budget").entered();
+    statistics.measure_for_budget(budget.gpu_time.is_some());
+    let is_least = !std::mem::take(cut.can_fall.get_mut());
+    cut.least_share = budget.least_share;
+    if budget.is_limited() {
+        let over = |wanted: Option<Duration>, seconds: f32| {
+            wanted.filter(|_| seconds > 0.0).map(|wanted| seconds / wanted.as_secs_f32().max(1e-6))
+        };
+        let gpu = over(budget.gpu_time, statistics.gpu_seconds());
+        let frame = over(budget.frame_time, cut.frame_seconds);
+        cut.steering.steer(gpu.into_iter().chain(frame).reduce(f32::max), is_least);
+    } else {
+        cut.steering = Steering::default();
+    }
+    statistics.set_cut(cut.steering.pixels());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::synth::{SynthSettings, synthesize};
+    use crate::view::{Camera, RasterFov};
+    use glam::{UVec2, Vec3};
+
+    /// Returns a cut at a size in pixels.
+    fn cut(pixels: f32) -> CaptureCut {
+        let mut cut = CaptureCut { least_share: 0.1, ..CaptureCut::default() };
+        while cut.steering.pixels() < pixels {
+            cut.steering.steer(Some(2.0), false);
+        }
+        cut
+    }
+
+    fn view(distance: f32) -> View {
+        let camera = Camera::look_at(Vec3::X * distance, Vec3::ZERO, Vec3::Z, 0.8, UVec2::new(640, 480));
+        camera.view(0.0, RasterFov::default())
+    }
+
+    #[test]
+    fn far_captures_lose_gaussians_first_and_keep_their_smallest_share() {
+        let scene = synthesize(&SynthSettings { count: 3000, ..SynthSettings::default() });
+        let importances = Importances::of(&scene.into_runtime().expect("it can be drawn"));
+        let bounds = Some(Bounds { min: Vec3::splat(-1.0), max: Vec3::splat(1.0) });
+        let thinned = ThinnedCapture { importances: &importances, bounds };
+        assert!(CaptureCut::default().thinning(&view(5.0), &thinned, 1.0).is_none(), "all Gaussians without a cut");
+        let cut = cut(0.5);
+        let share = |distance: f32, priority: f32| {
+            let thinning = cut.thinning(&view(distance), &thinned, priority);
+            if thinning.is_none() { 1.0 } else { importances.share_above(thinning.least) }
+        };
+        let shares = [4.0, 8.0, 16.0, 1e4].map(|distance| share(distance, 1.0));
+        assert!(shares.is_sorted_by(|near, far| near > far), "fewer Gaussians farther away: {shares:?}");
+        assert!((shares[3] - 0.1).abs() < 0.01, "the smallest share far away: {}", shares[3]);
+        assert!((share(8.0, 2.0) / shares[0] - 1.0).abs() < 0.2, "twice the priority is half the distance");
+        assert_eq!(share(1e4, f32::INFINITY), 1.0, "an infinite priority");
+        for broken in [0.0, -1.0, f32::NAN] {
+            assert!((share(4.0, broken) - 0.1).abs() < 0.01, "the smallest share at a priority of {broken}");
+        }
+    }
+
+    #[test]
+    fn whether_a_capture_can_be_drawn_with_less_is_known() {
+        let importances = Importances::default();
+        let thinned = ThinnedCapture { importances: &importances, bounds: None };
+        let mut cut = cut(0.5);
+        cut.thinning(&view(4.0), &thinned, 1.0);
+        assert!(!*cut.can_fall.get_mut(), "an empty capture has no Gaussians to leave out");
+        let scene = synthesize(&SynthSettings { count: 300, ..SynthSettings::default() });
+        let importances = Importances::of(&scene.into_runtime().expect("it can be drawn"));
+        cut.thinning(&view(0.5), &ThinnedCapture { importances: &importances, bounds: None }, 1.0);
+        assert!(*cut.can_fall.get_mut(), "a near capture has");
+    }
+
+    #[test]
+    fn a_unit_has_more_pixels_near_the_camera() {
+        let bounds = Some(Bounds { min: Vec3::splat(-0.1), max: Vec3::splat(0.1) });
+        let [near, far] = [5.0, 10.0].map(|distance| pixels_per_unit(&view(distance), bounds));
+        let expected = 640.0 / 2.0 / 0.4f32.tan() / 10.0;
+        assert!((far / expected - 1.0).abs() < 0.01, "{far} pixels at a distance of 10, expected {expected}");
+        assert!((near / far - 2.0).abs() < 0.01, "twice as many at half the distance: {near}");
+        assert!(pixels_per_unit(&view(1e-3), bounds).is_finite(), "in the middle of the capture");
+    }
+}

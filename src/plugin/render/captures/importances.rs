@@ -1,0 +1,91 @@
+//! How important the Gaussians of a capture are, as a distribution.
+//!
+//! In: a [`RuntimeScene`]. Out: [`Importances`], a sorted sample of the [importance](crate::gaussian::Gaussian::importance)
+//! of its Gaussians, which tells the share of them above an importance, and the importance that a share of them has.
+
+use crate::scene::RuntimeScene;
+
+/// Most Gaussians in the sample: a share is then exact to a hundredth.
+const SAMPLE: usize = 4096;
+
+/// A sample of the importances of a capture's Gaussians, capture units, descending; empty for an empty capture.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(in crate::plugin::render) struct Importances(Vec<f32>);
+
+impl Importances {
+    /// Returns the importances of Gaussians at even steps through a capture. At most 4,096 are decoded.
+    pub(in crate::plugin::render) fn of(scene: &RuntimeScene) -> Self {
+        let count = scene.len().min(SAMPLE);
+        let of_sample = |step: usize| scene.gaussian((step as u64 * scene.len() as u64 / count as u64) as usize);
+        let mut sample: Vec<f32> = (0..count).map(|step| of_sample(step).importance()).collect();
+        sample.sort_unstable_by(|a, b| b.total_cmp(a));
+        Self(sample)
+    }
+
+    /// Returns the share of the Gaussians that are more important than `least`, from 0 to 1.
+    pub(in crate::plugin::render) fn share_above(&self, least: f32) -> f32 {
+        let Self(sample) = self;
+        let above = sample.partition_point(|importance| *importance > least);
+        // Linear between two of the sample, so that a small change of `least` is a small change of the share.
+        let between = match (above.checked_sub(1).and_then(|index| sample.get(index)), sample.get(above)) {
+            (Some(more), Some(less)) if more > less => (more - least) / (more - less),
+            _ => 0.0,
+        };
+        (above as f32 + between.clamp(0.0, 1.0)) / (sample.len().max(1) as f32)
+    }
+
+    /// Returns the importance that about this share of the Gaussians exceed; 0 if it is all of them.
+    pub(in crate::plugin::render) fn least_of(&self, share: f32) -> f32 {
+        let Self(sample) = self;
+        let index = (share.max(0.0) * sample.len() as f32) as usize;
+        sample.get(index).copied().unwrap_or(0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Packing;
+    use crate::scene::synth::{SynthSettings, synthesize};
+
+    fn scene(count: usize) -> RuntimeScene {
+        synthesize(&SynthSettings { count, ..SynthSettings::default() }).into_runtime().expect("it can be drawn")
+    }
+
+    #[test]
+    fn the_share_above_an_importance_is_that_of_all_gaussians() {
+        let scene = scene(9000);
+        let importances = Importances::of(&scene);
+        let all: Vec<f32> = scene.iter().map(|gaussian| gaussian.importance()).collect();
+        for share in [0.05, 0.3, 0.5, 0.9] {
+            let least = importances.least_of(share);
+            let above = all.iter().filter(|importance| **importance > least).count() as f32 / all.len() as f32;
+            assert!((above - share).abs() < 0.02, "{above} of all Gaussians, {share} of the sample");
+            let found = importances.share_above(least);
+            assert!((found - share).abs() < 1e-3, "there and back: {found}, expected {share}");
+        }
+        assert_eq!((importances.least_of(1.0), importances.share_above(f32::INFINITY)), (0.0, 0.0), "all, and none");
+        assert_eq!(importances.share_above(-1.0), 1.0, "all are more important than nothing");
+    }
+
+    #[test]
+    fn the_share_changes_little_when_the_importance_does() {
+        let importances = Importances::of(&scene(500));
+        let (mut least, mut before) = (importances.least_of(0.0), 0.0);
+        while least > 1e-6 {
+            let share = importances.share_above(least);
+            assert!(share >= before && share - before < 0.02, "{before} to {share} at {least}");
+            (least, before) = (least * 0.998, share);
+        }
+    }
+
+    #[test]
+    fn packed_and_empty_captures_have_importances() {
+        let sliced = scene(700);
+        let packed = sliced.clone().pack(&Packing::default()).expect("it can be packed");
+        let [a, b] = [&sliced, &packed].map(|scene| Importances::of(scene).least_of(0.5));
+        assert!((a / b - 1.0).abs() < 0.05, "{a} and {b} are the medians");
+        let none = Importances::default();
+        assert_eq!((none.least_of(0.5), none.share_above(0.0)), (0.0, 0.0), "an empty capture");
+    }
+}
