@@ -15,7 +15,7 @@
 struct InstanceSlot {
     uniforms: InstanceUniforms,
     // Padding to 512 bytes, the distance of dynamic offsets.
-    padding: array<vec4<u32>, 13>,
+    padding: array<vec4<u32>, 12>,
 }
 @group(0) @binding(0) var<uniform> instances: array<InstanceSlot, 64>;
 var<private> instance: InstanceUniforms;

@@ -16,8 +16,7 @@ const MOST_BOOST: f32 = 2.0;
 /// to fill the gaps of those that are not. It is continuous: a small change of [`least`](Self::least) changes the
 /// picture a little.
 ///
-/// On views of the bundled captures, with two fifths of the Gaussians, larger and more opaque Gaussians are 1 to 3 dB
-/// closer to the picture of all Gaussians than unchanged ones. Default: all Gaussians, unchanged.
+/// Default: all Gaussians, unchanged.
 ///
 /// [`Gaussian::importance`]: crate::gaussian::Gaussian::importance
 ///

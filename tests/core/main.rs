@@ -44,6 +44,7 @@ mod sog;
 mod splatv;
 mod spz_and_gltf;
 mod thin;
+mod thinning;
 
 #[path = "../support"]
 mod support {
