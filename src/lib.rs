@@ -82,7 +82,8 @@
 //! (`src/renderer/tile_bins/`), its timestamp span (`sort` has two: by depth, by tile), its tests. The functions in
 //! [`mod@reference`] are those of the global sort; tile bins draw the same pictures. Each rule that several passes use
 //! has a file in `shaders/shared/` and one in [`gaussian`]: the tiles that a splat covers (`gaussian::overlap`), its
-//! alpha at a pixel (`gaussian::alpha`).
+//! alpha at a pixel (`gaussian::alpha`), its importance, by which a [`CaptureBudget`](render::CaptureBudget) thins
+//! captures (`gaussian::importance`).
 //!
 //! # The rings
 //!
