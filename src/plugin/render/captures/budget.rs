@@ -78,6 +78,8 @@ impl CaptureBudget {
 #[derive(Resource, Default)]
 pub(crate) struct CaptureCut {
     steering: Steering,
+    /// Whether there was a budget in the previous frame.
+    was_limited: bool,
     /// Time of the newest frame of the game, seconds.
     frame_seconds: f32,
     least_share: f32,
@@ -141,7 +143,7 @@ pub(in crate::plugin::render) fn extract_budget(
 
 /// Returns whether there is a budget, or was one in the previous frame.
 pub(in crate::plugin::render) fn any_budget(budget: Res<CaptureBudget>, cut: Res<CaptureCut>) -> bool {
-    budget.is_limited() || cut.steering != Steering::default()
+    budget.is_limited() || cut.was_limited
 }
 
 /// Changes the size below which Gaussians are left out.
@@ -154,7 +156,8 @@ pub(in crate::plugin::render) fn steer_cut(
     statistics.measure_for_budget(budget.gpu_time.is_some());
     let is_least = !std::mem::take(cut.can_fall.get_mut());
     cut.least_share = budget.least_share;
-    if budget.is_limited() {
+    cut.was_limited = budget.is_limited();
+    if cut.was_limited {
         let over = |wanted: Option<Duration>, seconds: f32| {
             wanted.filter(|_| seconds > 0.0).map(|wanted| seconds / wanted.as_secs_f32().max(1e-6))
         };

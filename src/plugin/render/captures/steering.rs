@@ -18,7 +18,7 @@ const TOLERANCE: f32 = 0.04;
 const FRAMES: usize = 5;
 
 /// The size of Gaussians on the screen below which they are left out.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub(super) struct Steering {
     /// The size, in powers of two of a pixel.
     stops: f32,
