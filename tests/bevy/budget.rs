@@ -25,7 +25,7 @@ const IMPOSSIBLE: CaptureBudget =
 const MANY: usize = 260;
 const GAUSSIANS: usize = 600;
 
-/// Returns whether the GPU of an app has timestamps.
+/// Returns whether the GPU of an app that has drawn has timestamps.
 fn has_timestamps(app: &App) -> bool {
     let features = app.sub_app(RenderApp).world().resource::<RenderDevice>().features();
     let has = features.contains(WgpuFeatures::TIMESTAMP_QUERY);
@@ -53,12 +53,12 @@ fn psnr(a: &RgbaImage, b: &RgbaImage) -> f64 {
 #[test]
 fn without_time_left_pictures_become_coarser_in_small_steps_and_all_gaussians_return() {
     let Some(mut app) = app(SIZE) else { return };
-    if !has_timestamps(&app) {
-        return;
-    }
     spawn(&mut app, &synthetic(GAUSSIANS, 1, false), ());
     let camera = spawn_camera(&mut app, Msaa::Off, synthetic_eye());
     let whole = picture(&mut app, 0.0);
+    if !has_timestamps(&app) {
+        return;
+    }
     let all = visible(&app, camera);
     app.insert_resource(CaptureBudget { gpu_time: Some(Duration::from_secs(60)), ..default() });
     run_frames(&mut app, 20);
@@ -95,13 +95,13 @@ fn without_time_left_pictures_become_coarser_in_small_steps_and_all_gaussians_re
 #[test]
 fn a_priority_keeps_the_gaussians_of_a_capture() {
     let Some(mut app) = app(SIZE) else { return };
-    if !has_timestamps(&app) {
-        return;
-    }
     let scene = synthetic(GAUSSIANS, 2, false);
     let entity = spawn(&mut app, &scene, CaptureSettings { priority: f32::INFINITY, ..default() });
     let camera = spawn_camera(&mut app, Msaa::Off, synthetic_eye());
     let whole = picture(&mut app, 0.0);
+    if !has_timestamps(&app) {
+        return;
+    }
     let all = visible(&app, camera);
     app.insert_resource(IMPOSSIBLE);
     run_frames(&mut app, 150);
@@ -126,9 +126,14 @@ fn the_time_of_frames_is_kept_without_timestamps_and_for_all_cameras() {
     app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(30)));
     app.insert_resource(CaptureBudget { frame_time: Some(Duration::from_millis(10)), ..default() });
     // Playback is paused: the passing time changes nothing else.
-    run_frames(&mut app, 100);
+    for _ in 0..MANY {
+        run_frames(&mut app, 1);
+        if visible(&app, first) * 4 < all[0] * 3 {
+            break;
+        }
+    }
     let left = [first, second].map(|camera| visible(&app, camera));
-    assert!(left[0] < all[0] && left[1] < all[1], "both cameras draw less: {left:?} of {all:?}");
+    assert!(left[0] * 4 < all[0] * 3 && left[1] < all[1], "both cameras draw less: {left:?} of {all:?}");
     let shares = [0, 1].map(|camera| f64::from(left[camera]) / f64::from(all[camera]));
     assert!(shares[1] < shares[0], "the farther one draws a smaller share: {shares:?}");
     app.insert_resource(CaptureBudget { frame_time: Some(Duration::from_millis(40)), ..default() });
