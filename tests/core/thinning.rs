@@ -47,7 +47,7 @@ fn larger_and_more_opaque_gaussians_fill_the_gaps() {
             let bare = psnr(&drawn(&scene, view, Thinning { growth: 1.0, boost: 1.0, ..thinning }), &whole);
             println!("{name}, {share} of the Gaussians: {bare:.2} dB unchanged, {filled:.2} dB filled");
             assert!(filled > bare + 0.5, "{name}, {share}: {filled:.2} dB filled, {bare:.2} dB unchanged");
-            assert!(filled > 20.0 && filled < before, "{name}, {share}: {filled:.2} dB, less than {before:.2}");
+            assert!(filled > 17.0 && filled < before, "{name}, {share}: {filled:.2} dB, less than {before:.2}");
             before = filled;
         }
     }

@@ -10,8 +10,8 @@ use crate::support::surfaces::edge;
 use bevy_gs4d::gaussian::Harmonics;
 use bevy_gs4d::reference::{Layer, render_layers};
 use bevy_gs4d::renderer::{Headless, Instance, OpaqueDepth, ViewParameters};
-use bevy_gs4d::scene::RuntimeScene;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use bevy_gs4d::scene::{Packing, RuntimeScene};
 use bevy_gs4d::view::srgb::decode;
 use bevy_gs4d::view::{Appearance, Background, BlendSpace, Camera, DebugView, Frame, RasterFov, Thinning, View};
 use glam::{Affine3A, Mat4, Quat, UVec2, Vec2, Vec3, Vec4};
@@ -102,19 +102,38 @@ fn appearances_match_the_cpu_reference() {
     let plain = both(&mut headless, &scene, view(), Appearance::default(), BlendSpace::Encoded);
     assert_same(&plain, "as trained");
     let crop = Affine3A::from_scale(Vec3::new(2.0, 1.5, 3.0)) * Affine3A::from_quat(Quat::from_rotation_y(0.4));
-    let thinning = Thinning::new(median_importance(&scene), 0.5);
     let looks = [
         ("half as opaque", Appearance { opacity: 0.5, ..Appearance::default() }),
         ("tinted and brighter", Appearance { light: Vec3::new(2.5, 1.0, 0.1), ..Appearance::default() }),
         ("cropped", Appearance { crop: Some(crop), ..Appearance::default() }),
-        ("thinned", Appearance { thinning, ..Appearance::default() }),
-        ("all at once", Appearance { opacity: 0.7, light: Vec3::new(0.3, 1.4, 0.9), crop: Some(crop), thinning }),
+        (
+            "all at once",
+            Appearance { opacity: 0.7, light: Vec3::new(0.3, 1.4, 0.9), crop: Some(crop), ..Appearance::default() },
+        ),
     ];
     for (what, appearance) in looks {
         for space in [BlendSpace::Encoded, BlendSpace::Linear] {
             let pictures = both(&mut headless, &scene, view(), appearance, space);
             assert_same(&pictures, &format!("{what}, {space:?}"));
             assert_shows(&pictures[0], &plain[0], &format!("{what}, {space:?}"));
+        }
+    }
+}
+
+#[test]
+fn thinned_captures_match_the_cpu_reference() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let sliced = scene();
+    let packed = sliced.clone().pack(&Packing::default()).expect("the scene fits");
+    for (form, scene) in [("sliced", sliced), ("packed", packed)] {
+        let [whole, _] = both(&mut headless, &scene, view(), Appearance::default(), BlendSpace::Encoded);
+        let thinning = Thinning::new(median_importance(&scene), 0.5);
+        for opacity in [1.0, 0.6] {
+            let appearance = Appearance { opacity, thinning, ..Appearance::default() };
+            let pictures = both(&mut headless, &scene, view(), appearance, BlendSpace::Encoded);
+            assert_same(&pictures, &format!("{form}, opacity {opacity}"));
+            let counts = [&whole, &pictures[0]].map(|frame| frame.counts.visible);
+            assert!(counts[1] * 4 < counts[0] * 3, "{form}: fewer splats are visible: {counts:?}");
         }
     }
 }
