@@ -5,7 +5,6 @@
 //! keeps those of a capture, and that two cameras share the budget. Skipped without a GPU; what needs timestamps also
 //! without these.
 
-use crate::support::cpu_reference::SIZE;
 use crate::support::fixtures::{insert, spawn, synthetic, synthetic_eye};
 use crate::support::offscreen_app::{app, picture, run_frames, spawn_camera};
 use crate::support::skip::skip;
@@ -15,6 +14,7 @@ use bevy::render::renderer::RenderDevice;
 use bevy::render::settings::WgpuFeatures;
 use bevy::time::TimeUpdateStrategy;
 use bevy_gs4d::render::{CaptureBudget, CaptureSettings, CaptureStatistics};
+use bevy_gs4d::testing::{self, Offscreen};
 use image::RgbaImage;
 use std::time::Duration;
 
@@ -23,6 +23,7 @@ const IMPOSSIBLE: CaptureBudget =
     CaptureBudget { gpu_time: Some(Duration::from_nanos(1)), frame_time: None, least_share: 0.1 };
 /// Frames after which such a budget has its full effect.
 const MANY: usize = 260;
+const SIZE: UVec2 = UVec2::new(64, 48);
 const GAUSSIANS: usize = 600;
 
 /// Returns whether the GPU of an app that has drawn has timestamps.
@@ -42,6 +43,17 @@ fn statistics(app: &App) -> CaptureStatistics {
 /// Returns the number of Gaussians that a camera draws.
 fn visible(app: &App, camera: Entity) -> u32 {
     statistics(app).view(camera).expect("the camera sees a capture").visible
+}
+
+/// Runs frames until a condition holds, at most so many as an impossible budget needs for its full effect.
+fn run_until(app: &mut App, holds: impl Fn(&App) -> bool) {
+    for _ in 0..MANY {
+        run_frames(app, 1);
+        if holds(app) {
+            return;
+        }
+    }
+    panic!("{MANY} frames are enough: {} px", statistics(app).cut());
 }
 
 /// Returns the PSNR of two pictures in dB, at most 99.
@@ -66,26 +78,30 @@ fn without_time_left_pictures_become_coarser_in_small_steps_and_all_gaussians_re
     assert_eq!(statistics(&app).cut(), 0.0, "nothing is left out");
 
     app.insert_resource(IMPOSSIBLE);
-    let (mut before, mut largest) = (whole.clone(), 0.0f64);
+    let offscreen = app.world().resource::<Offscreen>().clone();
+    let (mut before, mut nearest) = (whole.clone(), f64::INFINITY);
     for _ in 0..MANY {
-        let next = picture(&mut app, 0.0);
-        if psnr(&whole, &before) < 45.0 {
-            largest = largest.max(psnr(&whole, &before) - psnr(&whole, &next));
-        }
+        run_frames(&mut app, 1);
+        let next = testing::read(&mut app, &offscreen).expect("the picture is read");
+        nearest = nearest.min(psnr(&before, &next));
         before = next;
+        if visible(&app, camera) * 5 < all {
+            break;
+        }
     }
     let left = visible(&app, camera);
-    println!("{left} of {all} Gaussians, {:.1} dB, steps of at most {largest:.2} dB", psnr(&whole, &before));
-    assert!(left * 5 < all && left * 25 > all, "about a tenth of the {all} visible Gaussians is drawn: {left}");
-    assert!(psnr(&whole, &before) > 12.0, "the picture is coarse: {:.1} dB", psnr(&whole, &before));
-    assert!(largest < 1.0, "no step is larger than 1 dB: {largest:.2}");
+    let coarse = psnr(&whole, &before);
+    println!("{left} of {all} Gaussians, {coarse:.1} dB, two frames in turn have at least {nearest:.1} dB");
+    assert!(left * 5 < all && left * 25 > all, "few of the {all} visible Gaussians are drawn: {left}");
+    assert!(coarse > 12.0 && coarse < 35.0, "the picture is coarse: {coarse:.1} dB");
+    assert!(nearest > 30.0, "two frames in turn have at least 30 dB: {nearest:.1}");
     assert!(statistics(&app).cut() > 0.0, "the statistics tell the size");
 
     app.insert_resource(CaptureBudget { gpu_time: Some(Duration::from_secs(60)), ..default() });
-    run_frames(&mut app, MANY);
+    run_until(&mut app, |app| statistics(app).cut() == 0.0);
     assert_eq!(picture(&mut app, 0.0), whole, "all Gaussians return when there is time");
     app.insert_resource(IMPOSSIBLE);
-    run_frames(&mut app, 100);
+    run_until(&mut app, |app| visible(app, camera) * 5 < all * 4);
     assert_ne!(picture(&mut app, 0.0), whole, "coarser again");
     app.insert_resource(CaptureBudget::default());
     assert_eq!(picture(&mut app, 0.0), whole, "without a budget all Gaussians are drawn at once");
@@ -104,13 +120,11 @@ fn a_priority_keeps_the_gaussians_of_a_capture() {
     }
     let all = visible(&app, camera);
     app.insert_resource(IMPOSSIBLE);
-    run_frames(&mut app, 150);
+    run_frames(&mut app, 50);
     assert_eq!(picture(&mut app, 0.0), whole, "an infinite priority keeps all Gaussians");
     assert_eq!(statistics(&app).cut(), 0.0, "the size does not rise where it would change nothing");
     insert(&mut app, entity, CaptureSettings::default());
-    run_frames(&mut app, MANY);
-    let few = visible(&app, camera);
-    assert!(few * 2 < all, "the usual priority does not: {few} of {all}");
+    run_until(&mut app, |app| visible(app, camera) * 2 < all);
 }
 
 #[test]
@@ -126,18 +140,15 @@ fn the_time_of_frames_is_kept_without_timestamps_and_for_all_cameras() {
     app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(30)));
     app.insert_resource(CaptureBudget { frame_time: Some(Duration::from_millis(10)), ..default() });
     // Playback is paused: the passing time changes nothing else.
-    for _ in 0..MANY {
-        run_frames(&mut app, 1);
-        if visible(&app, first) * 4 < all[0] * 3 {
-            break;
-        }
-    }
+    run_until(&mut app, |app| visible(app, first) * 4 < all[0] * 3);
     let left = [first, second].map(|camera| visible(&app, camera));
     assert!(left[0] * 4 < all[0] * 3 && left[1] < all[1], "both cameras draw less: {left:?} of {all:?}");
     let shares = [0, 1].map(|camera| f64::from(left[camera]) / f64::from(all[camera]));
     assert!(shares[1] < shares[0], "the farther one draws a smaller share: {shares:?}");
     app.insert_resource(CaptureBudget { frame_time: Some(Duration::from_millis(40)), ..default() });
-    run_frames(&mut app, MANY);
+    run_until(&mut app, |app| statistics(app).cut() == 0.0);
+    // The counts of the GPU are some frames old.
+    run_frames(&mut app, 10);
     let again = [first, second].map(|camera| visible(&app, camera));
     assert_eq!(again, all, "all Gaussians return when frames are short enough");
 }
