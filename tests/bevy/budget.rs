@@ -24,7 +24,7 @@ const IMPOSSIBLE: CaptureBudget =
 /// Frames after which such a budget has its full effect.
 const MANY: usize = 260;
 const SIZE: UVec2 = UVec2::new(64, 48);
-const GAUSSIANS: usize = 600;
+const GAUSSIANS: usize = 2000;
 
 /// Returns whether the GPU of an app that has drawn has timestamps.
 fn has_timestamps(app: &App) -> bool {
