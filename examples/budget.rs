@@ -89,8 +89,8 @@ fn build(app: &mut App, copies: Copies, budget: CaptureBudget) {
 fn setup(mut commands: Commands, assets: Res<AssetServer>, copies: Res<Copies>) {
     let capture = assets.load(copies.capture.clone());
     for copy in 0..copies.count {
-        // Rows of four, each farther away than the one before.
-        let (column, row) = ((copy % 4) as f32 - 1.5, (copy / 4) as f32);
+        // Rows of up to four, each farther away than the one before.
+        let (column, row) = ((copy % 4) as f32 - 0.5 * (copies.count.min(4) - 1) as f32, (copy / 4) as f32);
         let place = Transform::from_xyz(1.6 * column, 0.0, -2.5 * row);
         commands.spawn((GaussianCapture3d(capture.clone()), Upright, place));
     }
