@@ -99,7 +99,7 @@
 //! | ring | subject | feature |
 //! |---|---|---|
 //! | [`view`] | cameras, times, appearance, pictures | |
-//! | [`gaussian`] | one native 4D Gaussian: slice, projection, color, the rules of overlap and alpha | |
+//! | [`gaussian`] | one native 4D Gaussian: slice, projection, color, the rules of overlap, alpha and importance | |
 //! | [`scene`] | a capture in memory: its forms, bounds, filter, origin; picking, edits | |
 //! | [`codec`] | files | |
 //! | [`mod@reference`] | the renderer's passes on the CPU, as plain functions over slices | |

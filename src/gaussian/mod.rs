@@ -2,7 +2,7 @@
 //!
 //! In: trained parameters ([`Parameters`], raw) and a camera at a time ([`View`](crate::view::View)). Out: the runtime
 //! form ([`Gaussian`], sliced once) and, per view, a splat: its `projection`, its color (`harmonics`), the tiles that
-//! it covers (`overlap`) and its opacity at a pixel (`alpha`).
+//! it covers (`overlap`) and its opacity at a pixel (`alpha`); its `importance` for pictures.
 //!
 //! A native 4D Gaussian is exactly a 3D Gaussian in straight-line motion under a Gaussian opacity envelope. With the 4D
 //! covariance `Σ = [[A, c], [cᵀ, v]]`:

@@ -1,8 +1,8 @@
 //! Views of a capture and the results of drawing them: the innermost ring, which contains nothing about Gaussians.
 //!
 //! In: cameras ([`Camera`]; at one time, a [`View`]), how a capture was trained to be drawn ([`Optics`]), and how
-//! captures are shown ([`Appearance`], [`Background`], [`BlendSpace`], [`DebugView`]). Out: the types of a drawn view,
-//! [`Picture`] and [`Frame`].
+//! captures are shown ([`Appearance`], [`Thinning`], [`Background`], [`BlendSpace`], [`DebugView`]). Out: the types of a
+//! drawn view, [`Picture`] and [`Frame`].
 
 mod appearance;
 mod camera;

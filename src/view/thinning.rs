@@ -3,10 +3,11 @@
 //! In: the least importance that is drawn, and the share of Gaussians above it. Out: a [`Thinning`]: the weight of a
 //! Gaussian of some importance, and how much larger and more opaque the remaining Gaussians are drawn.
 
-/// Gaussians fade in from the least importance to this multiple of it, so that none appears at once.
-const FULL: f32 = 1.25;
-/// The remaining Gaussians are larger by the share of them to this power: variances, so areas too.
+/// The factor on the covariances of the Gaussians that remain is their share to this power, at most [`MOST_GROWTH`];
+/// their areas grow by the same factor.
 const GROWTH: f32 = -0.2;
+/// The largest factor, that of a thirtieth of the Gaussians.
+const MOST_GROWTH: f32 = 2.0;
 /// Their transmittance is raised to the share to this power, at most to [`MOST_BOOST`].
 const BOOST: f32 = -0.7;
 /// The largest power of their transmittance: each covers as much as two copies of it.
@@ -35,7 +36,7 @@ pub struct Thinning {
     /// Gaussians of at most this importance are not drawn, those of up to 1.25 times as much are fainter; capture
     /// units. 0: all Gaussians are drawn, unchanged.
     pub least: f32,
-    /// Factor on the covariances of the Gaussians that are drawn, at least 1.
+    /// Factor on the covariances of the Gaussians that are drawn, from 1 to 2.
     pub growth: f32,
     /// Power of their transmittance `1 − opacity`, from 1 to 2.
     pub boost: f32,
@@ -48,10 +49,13 @@ impl Default for Thinning {
 }
 
 impl Thinning {
+    /// Gaussians fade in from the least importance to this multiple of it, so that none appears at once.
+    pub const FULL: f32 = 1.25;
+
     /// Returns the thinning to the Gaussians above an importance, which are this share of all, above 0 and at most 1.
     pub fn new(least: f32, share: f32) -> Self {
         let share = share.clamp(f32::MIN_POSITIVE, 1.0);
-        Self { least, growth: share.powf(GROWTH), boost: share.powf(BOOST).min(MOST_BOOST) }
+        Self { least, growth: share.powf(GROWTH).min(MOST_GROWTH), boost: share.powf(BOOST).min(MOST_BOOST) }
     }
 
     /// Returns whether all Gaussians are drawn, unchanged.
@@ -61,12 +65,12 @@ impl Thinning {
 
     /// Returns the factor on the opacity of a Gaussian of this importance, from 0 to 1.
     pub fn weight(&self, importance: f32) -> f32 {
-        if self.is_none() { 1.0 } else { ((importance / self.least - 1.0) / (FULL - 1.0)).clamp(0.0, 1.0) }
+        if self.is_none() { 1.0 } else { ((importance / self.least - 1.0) / (Self::FULL - 1.0)).clamp(0.0, 1.0) }
     }
 
     /// Returns the opacity at which a splat of this opacity is drawn.
     pub fn boosted(&self, opacity: f32) -> f32 {
-        if self.is_none() { opacity } else { 1.0 - (1.0 - opacity.min(1.0)).powf(self.boost) }
+        if self.is_none() || opacity >= 1.0 { opacity } else { 1.0 - (1.0 - opacity).powf(self.boost) }
     }
 }
 
@@ -98,9 +102,9 @@ mod tests {
         for pair in found.windows(2) {
             assert!(pair[1].growth > pair[0].growth && pair[1].boost >= pair[0].boost, "a smaller share: {pair:?}");
         }
-        assert!(found.iter().all(|thinning| thinning.growth.is_finite() && thinning.boost <= 2.0), "bounds: {found:?}");
+        assert!(found.iter().all(|thinning| thinning.growth <= 2.0 && thinning.boost <= 2.0), "bounds: {found:?}");
         let two = Thinning { least: 1.0, growth: 1.0, boost: 2.0 };
         assert!((two.boosted(0.5) - 0.75).abs() < 1e-6, "two copies of half the opacity");
-        assert_eq!((two.boosted(0.0), two.boosted(1.0)), (0.0, 1.0), "nothing and everything stay");
+        assert_eq!([0.0, 1.0, 1.5].map(|opacity| two.boosted(opacity)), [0.0, 1.0, 1.5], "nothing and everything stay");
     }
 }

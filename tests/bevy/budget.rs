@@ -5,6 +5,7 @@
 //! keeps those of a capture, and that two cameras share the budget. Skipped without a GPU; what needs timestamps also
 //! without these.
 
+use crate::detail::psnr;
 use crate::support::fixtures::{insert, spawn, synthetic, synthetic_eye};
 use crate::support::offscreen_app::{app, picture, run_frames, spawn_camera};
 use crate::support::skip::skip;
@@ -15,7 +16,6 @@ use bevy::render::settings::WgpuFeatures;
 use bevy::time::TimeUpdateStrategy;
 use bevy_gs4d::render::{CaptureBudget, CaptureSettings, CaptureStatistics};
 use bevy_gs4d::testing::{self, Offscreen};
-use image::RgbaImage;
 use std::time::Duration;
 
 /// A budget of GPU time that no GPU keeps.
@@ -24,7 +24,7 @@ const IMPOSSIBLE: CaptureBudget =
 /// Frames after which such a budget has its full effect.
 const MANY: usize = 260;
 const SIZE: UVec2 = UVec2::new(64, 48);
-const GAUSSIANS: usize = 2000;
+const GAUSSIANS: usize = 4000;
 
 /// Returns whether the GPU of an app that has drawn has timestamps.
 fn has_timestamps(app: &App) -> bool {
@@ -54,12 +54,6 @@ fn run_until(app: &mut App, holds: impl Fn(&App) -> bool) {
         }
     }
     panic!("{MANY} frames are enough: {} px", statistics(app).cut());
-}
-
-/// Returns the PSNR of two pictures in dB, at most 99.
-fn psnr(a: &RgbaImage, b: &RgbaImage) -> f64 {
-    let squares: f64 = a.iter().zip(b.iter()).map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2)).sum();
-    (-10.0 * (squares / a.len() as f64 / 255.0f64.powi(2)).log10()).min(99.0)
 }
 
 #[test]

@@ -129,7 +129,7 @@ fn a_capture_without_levels_is_drawn_whole() {
 }
 
 /// Returns the PSNR of two pictures in dB.
-fn psnr(a: &RgbaImage, b: &RgbaImage) -> f64 {
+pub fn psnr(a: &RgbaImage, b: &RgbaImage) -> f64 {
     let (mut squares, mut count) = (0.0, 0u32);
     for (a, b) in a.pixels().zip(b.pixels()) {
         squares += a.0[..3].iter().zip(&b.0[..3]).map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2)).sum::<f64>();

@@ -17,7 +17,7 @@ use bevy_gs4d::internal::renderer::{
     self, Activation, BLOCK, Counters, DIGITS, FrameUniforms, INSTANCE_STRIDE, INSTANCES_AT_ONCE, InstanceUniforms,
     MotionUniforms, SortStep, SplatRecord, SplatShape, VisibleSplat,
 };
-use bevy_gs4d::view::TILE_SIZE;
+use bevy_gs4d::view::{TILE_SIZE, Thinning};
 use std::collections::{BTreeMap, BTreeSet};
 use std::mem::offset_of;
 use wgpu::naga::front::wgsl::parse_str;
@@ -294,6 +294,7 @@ fn constants_of_the_libraries_match_the_host() {
         include_str!("../../shaders/shared/conic.wgsl"),
         include_str!("../../shaders/shared/alpha.wgsl"),
         include_str!("../../shaders/shared/tile.wgsl"),
+        include_str!("../../shaders/shared/importance.wgsl"),
     ];
     let lines = sources.iter().flat_map(|source| source.lines()).filter(|line| !line.starts_with('#'));
     let libraries = parse_str(&lines.collect::<Vec<_>>().join("\n")).expect("the libraries are WGSL");
@@ -327,6 +328,7 @@ fn constants_of_the_libraries_match_the_host() {
         ("INVERSE_ALPHA_MIN", ALPHA_MIN.recip().round()),
         ("ALPHA_MAX", ALPHA_MAX),
         ("TRANSMITTANCE_MIN", TRANSMITTANCE_MIN),
+        ("FULL", Thinning::FULL),
     ];
     assert_eq!(libraries.constants.len(), integers.len() + floats.len(), "every constant of the libraries is compared");
     let integers = integers.map(|(name, value)| (name, f64::from(value)));

@@ -1,7 +1,7 @@
 //! The section "GPU time": the time of each pass.
 //!
-//! In: whether the section is open, the measured passes, the size below which a budget leaves out Gaussians. Out: bars. Measuring is on only while the section is open,
-//! because it takes time itself.
+//! In: whether the section is open, the measured passes, the size below which a budget leaves out Gaussians. Out: bars.
+//! The panel measures only while the section is open, because measuring takes time itself.
 
 use super::counts::bar;
 use super::presentation::fraction;

@@ -9,8 +9,8 @@
 //! visibility   a capture's bounds at this time -> its Aabb           main world
 //! extract      captures, their times, poses and settings             main world -> render world
 //! upload       a loaded capture -> buffers on the GPU                once per asset, over several frames
+//! budget       the size below which Gaussians are left out           once per frame, for all views
 //! detail       level of detail by the size on the screen             once per camera, placed capture and frame
-//! budget       the Gaussians left out to keep the time               once per frame, for all views
 //! active       the lists of active Gaussians                         once per placed capture and segment
 //! prepare      a camera's lens and the poses of captures -> views    once per camera and frame, into capture_views
 //! order        transparent items before and after captures           once per camera and frame

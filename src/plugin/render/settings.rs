@@ -48,7 +48,8 @@ pub struct CaptureSettings {
     /// fewer Gaussians; a number above the coarsest level selects the coarsest. Default: 0.
     pub finest_level: u8,
     /// Factor on the size of its Gaussians where a [`CaptureBudget`](super::CaptureBudget) leaves out the smallest: at 2
-    /// its detail is that of a capture at half the distance; at infinity all of its Gaussians are drawn. Default: 1.
+    /// its detail is that of a capture at half the distance; at infinity all of its Gaussians are drawn. Less than a
+    /// thousandth counts as a thousandth. Default: 1.
     pub priority: f32,
     /// Whether Gaussians are anti-aliased: where they are smaller on the screen than in training, they are drawn
     /// fainter, so that they cover no more than in training. Without anti-aliasing, distant Gaussians appear too large.

@@ -53,7 +53,8 @@ struct Shared {
 
 impl CaptureStatistics {
     /// Starts or stops measuring the GPU time of each pass. The first times arrive some frames later; on a GPU without
-    /// timestamps no times arrive. The inspector also measures while it shows these times. Default: not measured.
+    /// timestamps no times arrive. The inspector also measures while it shows these times, and so does a
+    /// [`CaptureBudget`](super::CaptureBudget) of GPU time. Default: not measured.
     pub fn measure(&self, on: bool) {
         self.lock().measure = on;
     }
@@ -82,7 +83,7 @@ impl CaptureStatistics {
 
     /// Returns the GPU time of captures in the newest measured frame, summed over all cameras, in seconds; 0 if it has
     /// not been measured.
-    pub(super) fn gpu_seconds(&self) -> f32 {
+    pub fn gpu_seconds(&self) -> f32 {
         let milliseconds =
             self.lock().views.iter().flat_map(|(_, view)| &view.passes).map(|pass| pass.milliseconds).sum::<f64>();
         (milliseconds * 1e-3) as f32

@@ -1,6 +1,6 @@
 //! Prepare: collects the captures in each view of a light and prepares the renderer's working buffers.
 //!
-//! In: [`ExtractedCasters`], the views of lights whose shadow maps Bevy draws this frame. Out: [`LightViews`], with all
+//! In: [`ExtractedCasters`], [`CaptureCut`], the views of lights whose shadow maps Bevy draws this frame. Out: [`LightViews`], with all
 //! inputs of drawing written to the GPU. In the steady state no GPU object is created.
 
 use super::casts::ShadowResolution;

@@ -1,7 +1,7 @@
 //! Budget: leaves out Gaussians that are small on the screen while captures take more time than the game gives them.
 //!
-//! In: [`CaptureBudget`], the GPU times of [`CaptureStatistics`], the time of the frame; for each capture in a view, its
-//! [`Importances`] and its place. Out: the [`Thinning`] of each capture in each view, which changes slowly.
+//! In: [`CaptureBudget`], the GPU times of [`CaptureStatistics`], the time of the frame; for each capture in a view,
+//! its [`Importances`] and its place. Out: the [`Thinning`] of each capture in each view, which changes slowly.
 
 use super::importances::Importances;
 use super::steering::Steering;
@@ -16,7 +16,7 @@ use bevy::reflect::Reflect;
 use bevy::reflect::std_traits::ReflectDefault;
 use bevy::render::Extract;
 use bevy::time::{Real, Time};
-use glam::{Mat3, Vec2};
+use glam::{Mat3, Vec2, Vec3};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
@@ -39,7 +39,7 @@ use std::time::Duration;
 /// use std::time::Duration;
 ///
 /// fn setup(mut commands: Commands) {
-///     // Four milliseconds of the GPU, on every GPU.
+///     // Four milliseconds of the GPU, on a fast one and on a slow one.
 ///     let gpu_time = Some(Duration::from_millis(4));
 ///     commands.insert_resource(CaptureBudget { gpu_time, ..default() });
 /// }
@@ -53,11 +53,12 @@ pub struct CaptureBudget {
     /// [`CaptureStatistics::measure`] is off; on a GPU without timestamps it has no effect. Default: `None`, no limit.
     pub gpu_time: Option<Duration>,
     /// Time from a frame to the next, of the whole game, for GPUs without timestamps. With vertical synchronization,
-    /// choose a little more than the time between two refreshes: a frame never takes less than that. If both times are
-    /// given, both are kept. Default: `None`, no limit.
+    /// choose a tenth more than the time between two refreshes: a frame never takes less than that. Frames that the app
+    /// delays on purpose count as well, such as those of Bevy's reactive update mode. If both times are given, both are
+    /// kept. Default: `None`, no limit.
     pub frame_time: Option<Duration>,
-    /// The smallest share of the Gaussians of a capture that is drawn, from 0 to 1; a capture is drawn with these even
-    /// if the time is exceeded. Default: 1/16.
+    /// The smallest share of the Gaussians of a capture, those of all times, that is drawn whole, from 0 to 1, even if
+    /// the time is exceeded; at least one of 4,096. Default: 1/16.
     pub least_share: f32,
 }
 
@@ -74,6 +75,9 @@ impl CaptureBudget {
     }
 }
 
+/// Smaller priorities count as this one.
+const LEAST_PRIORITY: f32 = 1e-3;
+
 /// The size on the screen below which Gaussians are left out, for all views.
 #[derive(Resource, Default)]
 pub(crate) struct CaptureCut {
@@ -83,29 +87,37 @@ pub(crate) struct CaptureCut {
     /// Time of the newest frame of the game, seconds.
     frame_seconds: f32,
     least_share: f32,
-    /// Whether any capture could be drawn with fewer Gaussians in this frame.
+    /// Whether any capture that a camera sees could be drawn with fewer Gaussians in this frame.
     can_fall: AtomicBool,
 }
 
 impl CaptureCut {
-    /// Returns the Gaussians of a capture that are drawn in a view, at this priority.
-    pub(crate) fn thinning(&self, view: &View, thinned: &ThinnedCapture<'_>, priority: f32) -> Thinning {
-        let pixels = self.steering.pixels();
-        if priority == f32::INFINITY {
-            return Thinning::default();
-        }
-        if pixels == 0.0 {
-            self.can_fall.store(true, Ordering::Relaxed);
-            return Thinning::default();
-        }
-        // A priority that is negative or not a number counts as 0: the smallest share.
-        let wanted = pixels / (pixels_per_unit(view, thinned.bounds) * priority.max(0.0));
-        let most = thinned.importances.least_of(self.least_share);
+    /// Returns the Gaussians of a capture that are drawn in a view of a camera, at this priority.
+    pub(in crate::plugin::render) fn seen(&self, view: &View, thinned: &ThinnedCapture<'_>, priority: f32) -> Thinning {
+        let [wanted, most] = self.least(view, thinned, priority);
         if wanted < most {
             self.can_fall.store(true, Ordering::Relaxed);
         }
+        self.thinning(view, thinned, priority)
+    }
+
+    /// Returns the Gaussians of a capture that are drawn in a view whose time is not measured, such as that of a light.
+    pub(crate) fn thinning(&self, view: &View, thinned: &ThinnedCapture<'_>, priority: f32) -> Thinning {
+        let [wanted, most] = self.least(view, thinned, priority);
         let least = wanted.min(most);
-        Thinning::new(least, thinned.importances.share_above(least))
+        if least > 0.0 { Thinning::new(least, thinned.importances.share_above(least)) } else { Thinning::default() }
+    }
+
+    /// Returns the least importance that is drawn by the size on the screen, and that of the smallest share.
+    fn least(&self, view: &View, thinned: &ThinnedCapture<'_>, priority: f32) -> [f32; 2] {
+        if priority == f32::INFINITY {
+            return [0.0; 2];
+        }
+        let pixels = self.steering.pixels();
+        // A priority that is negative or not a number is the smallest.
+        let size = pixels_per_unit(view, thinned.bounds) * priority.max(LEAST_PRIORITY);
+        let wanted = if pixels == 0.0 { 0.0 } else { pixels / size };
+        [wanted, thinned.importances.least_of(self.least_share)]
     }
 }
 
@@ -126,7 +138,7 @@ fn pixels_per_unit(view: &View, bounds: Option<Bounds>) -> f32 {
         return focal;
     }
     // A camera inside the capture sees most of it at the distance of its bounds.
-    let (center, radius) = bounds.map_or((glam::Vec3::ZERO, 1.0), |bounds| (bounds.center(), bounds.radius()));
+    let (center, radius) = bounds.map_or((Vec3::ZERO, 1.0), |bounds| (bounds.center(), bounds.radius()));
     focal / view.world_to_camera.transform_point3(center).length().hypot(radius * scale)
 }
 
@@ -134,10 +146,10 @@ fn pixels_per_unit(view: &View, bounds: Option<Bounds>) -> f32 {
 pub(in crate::plugin::render) fn extract_budget(
     mut extracted: ResMut<CaptureBudget>,
     mut cut: ResMut<CaptureCut>,
-    budget: Extract<Res<CaptureBudget>>,
+    budget: Extract<Option<Res<CaptureBudget>>>,
     time: Extract<Option<Res<Time<Real>>>>,
 ) {
-    *extracted = **budget;
+    *extracted = budget.as_deref().copied().unwrap_or_default();
     cut.frame_seconds = time.as_ref().map_or(0.0, |time| time.delta_secs());
 }
 
@@ -175,7 +187,7 @@ mod tests {
     use super::*;
     use crate::scene::synth::{SynthSettings, synthesize};
     use crate::view::{Camera, RasterFov};
-    use glam::{UVec2, Vec3};
+    use glam::UVec2;
 
     /// Returns a cut at a size in pixels.
     fn cut(pixels: f32) -> CaptureCut {
@@ -205,11 +217,13 @@ mod tests {
         };
         let shares = [4.0, 8.0, 16.0, 1e4].map(|distance| share(distance, 1.0));
         assert!(shares.is_sorted_by(|near, far| near > far), "fewer Gaussians farther away: {shares:?}");
-        assert!((shares[3] - 0.1).abs() < 0.01, "the smallest share far away: {}", shares[3]);
+        let smallest = importances.share_above(importances.least_of(0.1));
+        assert!((0.1..0.25).contains(&smallest), "a tenth of the Gaussians whole, others faint: {smallest}");
+        assert_eq!(shares[3], smallest, "the smallest share far away");
         assert!((share(8.0, 2.0) / shares[0] - 1.0).abs() < 0.2, "twice the priority is half the distance");
         assert_eq!(share(1e4, f32::INFINITY), 1.0, "an infinite priority");
         for broken in [0.0, -1.0, f32::NAN] {
-            assert!((share(4.0, broken) - 0.1).abs() < 0.01, "the smallest share at a priority of {broken}");
+            assert_eq!(share(4.0, broken), smallest, "the smallest share at a priority of {broken}");
         }
     }
 
@@ -218,11 +232,16 @@ mod tests {
         let importances = Importances::default();
         let thinned = ThinnedCapture { importances: &importances, bounds: None };
         let mut cut = cut(0.5);
-        cut.thinning(&view(4.0), &thinned, 1.0);
+        cut.seen(&view(4.0), &thinned, 1.0);
         assert!(!*cut.can_fall.get_mut(), "an empty capture has no Gaussians to leave out");
         let scene = synthesize(&SynthSettings { count: 300, ..SynthSettings::default() });
         let importances = Importances::of(&scene.into_runtime().expect("it can be drawn"));
-        cut.thinning(&view(0.5), &ThinnedCapture { importances: &importances, bounds: None }, 1.0);
+        let thinned = ThinnedCapture { importances: &importances, bounds: None };
+        cut.seen(&view(0.5), &thinned, f32::INFINITY);
+        cut.seen(&view(1e5), &thinned, 1.0);
+        cut.thinning(&view(0.5), &thinned, 1.0);
+        assert!(!*cut.can_fall.get_mut(), "one of infinite priority, one at its smallest share, one in a shadow");
+        cut.seen(&view(0.5), &thinned, 1.0);
         assert!(*cut.can_fall.get_mut(), "a near capture has");
     }
 

@@ -31,11 +31,12 @@ const SLACK: f32 = 0.8;
 const ALIKE: f32 = 1.1;
 /// The same ratio for cameras that drew the same level in the previous frame: larger, so that levels do not flicker.
 const STILL_ALIKE: f32 = 1.2;
+
 /// The detail at which captures are drawn: a resource.
 ///
 /// Captures with levels of detail (`gs4d detail`) are drawn with fewer Gaussians where they are small on the screen.
-/// [`CaptureSettings::finest_level`](crate::plugin::render::CaptureSettings::finest_level) limits the detail of one capture,
-/// [`CaptureBudget`](crate::plugin::render::CaptureBudget) the time of all of them.
+/// [`CaptureSettings::finest_level`](crate::plugin::render::CaptureSettings::finest_level) limits the detail of one
+/// capture, [`CaptureBudget`](crate::plugin::render::CaptureBudget) the time of all of them.
 ///
 /// # Examples
 ///

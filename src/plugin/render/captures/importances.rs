@@ -1,9 +1,11 @@
 //! How important the Gaussians of a capture are, as a distribution.
 //!
-//! In: a [`RuntimeScene`]. Out: [`Importances`], a sorted sample of the [importance](crate::gaussian::Gaussian::importance)
-//! of its Gaussians, which tells the share of them above an importance, and the importance that a share of them has.
+//! In: a [`RuntimeScene`]. Out: [`Importances`], a sorted sample of the
+//! [importance](crate::gaussian::Gaussian::importance) of its Gaussians, which tells the share of them above an
+//! importance, and the least importance with which a share of them is drawn.
 
 use crate::scene::RuntimeScene;
+use crate::view::Thinning;
 
 /// Most Gaussians in the sample: a share is then exact to a hundredth.
 const SAMPLE: usize = 4096;
@@ -34,11 +36,12 @@ impl Importances {
         (above as f32 + between.clamp(0.0, 1.0)) / (sample.len().max(1) as f32)
     }
 
-    /// Returns the importance that about this share of the Gaussians exceed; 0 if it is all of them.
+    /// Returns the [least importance](Thinning::least) with which about this share of the Gaussians, and at least one of
+    /// the sample, is drawn whole; 0 if it is all of them. A share that is not a number counts as 0.
     pub(in crate::plugin::render) fn least_of(&self, share: f32) -> f32 {
         let Self(sample) = self;
-        let index = (share.max(0.0) * sample.len() as f32) as usize;
-        sample.get(index).copied().unwrap_or(0.0)
+        let count = (share * sample.len() as f32).ceil().max(1.0) as usize;
+        if count >= sample.len() { 0.0 } else { sample[count - 1] / Thinning::FULL }
     }
 }
 
@@ -59,9 +62,11 @@ mod tests {
         let all: Vec<f32> = scene.iter().map(|gaussian| gaussian.importance()).collect();
         for share in [0.05, 0.3, 0.5, 0.9] {
             let least = importances.least_of(share);
-            let above = all.iter().filter(|importance| **importance > least).count() as f32 / all.len() as f32;
-            assert!((above - share).abs() < 0.02, "{above} of all Gaussians, {share} of the sample");
-            let found = importances.share_above(least);
+            let thinning = Thinning::new(least, share);
+            let whole = all.iter().filter(|importance| thinning.weight(**importance) > 0.999).count();
+            let whole = whole as f32 / all.len() as f32;
+            assert!((whole - share).abs() < 0.02, "{whole} of all Gaussians are drawn whole, {share} of the sample");
+            let found = importances.share_above(least * Thinning::FULL);
             assert!((found - share).abs() < 1e-3, "there and back: {found}, expected {share}");
         }
         assert_eq!((importances.least_of(1.0), importances.share_above(f32::INFINITY)), (0.0, 0.0), "all, and none");
@@ -71,7 +76,7 @@ mod tests {
     #[test]
     fn the_share_changes_little_when_the_importance_does() {
         let importances = Importances::of(&scene(500));
-        let (mut least, mut before) = (importances.least_of(0.0), 0.0);
+        let (mut least, mut before) = (2.0 * importances.least_of(0.0), 0.0);
         while least > 1e-6 {
             let share = importances.share_above(least);
             assert!(share >= before && share - before < 0.02, "{before} to {share} at {least}");
@@ -87,5 +92,18 @@ mod tests {
         assert!((a / b - 1.0).abs() < 0.05, "{a} and {b} are the medians");
         let none = Importances::default();
         assert_eq!((none.least_of(0.5), none.share_above(0.0)), (0.0, 0.0), "an empty capture");
+    }
+
+    #[test]
+    fn few_and_equal_gaussians_are_drawn_at_the_smallest_share() {
+        for sample in [vec![3.0], vec![5.0, 4.0, 3.0, 2.0, 1.0], vec![0.7; 100]] {
+            let importances = Importances(sample.clone());
+            for share in [0.0, 1.0 / 16.0, f32::NAN] {
+                let least = importances.least_of(share);
+                let thinning = Thinning::new(least, importances.share_above(least));
+                let most = thinning.weight(sample[0]);
+                assert!(most > 0.999, "the most important of {sample:?} has the weight {most} at a share of {share}");
+            }
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! Captures on the GPU, before any camera looks at them.
 //!
-//! In: entities with captures, their times, poses and settings. Out: buffers on the GPU, the list of active Gaussians, the
-//! level of detail and the thinning of each placed capture.
+//! In: entities with captures, their times, poses and settings. Out: buffers on the GPU, the list of active Gaussians,
+//! the level of detail and the thinning of each placed capture.
 
 pub(crate) mod active;
 pub(crate) mod back_off;

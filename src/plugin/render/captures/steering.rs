@@ -4,7 +4,7 @@
 //! which rises and falls slowly. Nothing here depends on Bevy or on a GPU.
 
 /// The lowest size, in powers of two of a pixel: no Gaussian is left out.
-const LOWEST: f32 = -8.0;
+const LOWEST: f32 = -6.0;
 /// The highest size.
 const HIGHEST: f32 = 6.0;
 /// The largest change of the size per frame, in powers of two: pictures of a still view change little.
@@ -12,7 +12,7 @@ const STEP: f32 = 1.0 / 16.0;
 /// Change of the size per frame for frames that take twice as long as wanted, in powers of two. A measured time is some
 /// frames old, and time falls by at most as much as the size rises: no larger gain is stable with ten frames of delay.
 const GAIN: f32 = 0.1;
-/// Times up to this many powers of two from the one that is wanted change nothing.
+/// Times up to this many powers of two above the one that is wanted change nothing.
 const TOLERANCE: f32 = 0.04;
 /// Frames of which the median is taken, so that a single long frame changes nothing.
 const FRAMES: usize = 5;
@@ -48,7 +48,7 @@ impl Steering {
         let mut sorted = self.recent;
         sorted.sort_unstable_by(f32::total_cmp);
         let longer = sorted[FRAMES / 2];
-        if longer.abs() > TOLERANCE && !(is_least && longer > 0.0) {
+        if longer < 0.0 || (longer > TOLERANCE && !is_least) {
             self.stops = (self.stops + (GAIN * longer).clamp(-STEP, STEP)).clamp(LOWEST, HIGHEST);
         }
     }

@@ -1,6 +1,6 @@
 //! Prepare: collects the captures that each camera sees and prepares the renderer's working buffers.
 //!
-//! In: [`ExtractedCaptures`], Bevy's extracted cameras with their visible entities and depth textures. Out:
+//! In: [`ExtractedCaptures`], [`CaptureCut`], Bevy's extracted cameras with their visible entities and depth textures. Out:
 //! [`CaptureViews`], with all inputs of drawing written to the GPU. In the steady state no GPU object is created.
 //!
 //! Errors of the GPU are caught, view by view. If there is no room for the captures that a camera sees, it draws the
@@ -91,7 +91,7 @@ impl Scene<'_> {
             let level = self.levels.of(viewer, *entity);
             let optics = capture.optics(level, placed.antialias)?;
             let view = lens.view(size, time, camera, placed.world_from_capture)?.with_optics(optics);
-            let thinning = self.cut.thinning(&view, &capture.thinned(level)?, placed.priority);
+            let thinning = self.cut.seen(&view, &capture.thinned(level)?, placed.priority);
             let (asset, appearance) = (placed.asset, Appearance { thinning, ..placed.appearance });
             let filtered = placed.filtered;
             Some(Drawn { entity: *entity, asset, view, appearance, filtered, level })
