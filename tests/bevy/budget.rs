@@ -24,7 +24,7 @@ const IMPOSSIBLE: CaptureBudget =
 /// Frames after which such a budget has its full effect.
 const MANY: usize = 260;
 const SIZE: UVec2 = UVec2::new(64, 48);
-const GAUSSIANS: usize = 4000;
+const GAUSSIANS: usize = 2000;
 
 /// Returns whether the GPU of an app that has drawn has timestamps.
 fn has_timestamps(app: &App) -> bool {
@@ -79,14 +79,15 @@ fn without_time_left_pictures_become_coarser_in_small_steps_and_all_gaussians_re
         let next = testing::read(&mut app, &offscreen).expect("the picture is read");
         nearest = nearest.min(psnr(&before, &next));
         before = next;
-        if visible(&app, camera) * 5 < all {
+        if visible(&app, camera) * 2 < all {
             break;
         }
     }
     let left = visible(&app, camera);
     let coarse = psnr(&whole, &before);
     println!("{left} of {all} Gaussians, {coarse:.1} dB, two frames in turn have at least {nearest:.1} dB");
-    assert!(left * 5 < all && left * 25 > all, "few of the {all} visible Gaussians are drawn: {left}");
+    // A tenth is drawn whole, others are fainter.
+    assert!(left * 2 < all && left * 10 > all, "few of the {all} visible Gaussians are drawn: {left}");
     assert!(coarse > 12.0 && coarse < 35.0, "the picture is coarse: {coarse:.1} dB");
     assert!(nearest > 30.0, "two frames in turn have at least 30 dB: {nearest:.1}");
     assert!(statistics(&app).cut() > 0.0, "the statistics tell the size");
