@@ -17,6 +17,8 @@
 
 #[path = "common/arguments.rs"]
 mod arguments;
+#[path = "common/size.rs"]
+mod size;
 
 use arguments::{Arguments, asset_path, parse, save_pictures, value};
 use bevy::asset::UnapprovedPathMode;
@@ -24,6 +26,7 @@ use bevy::prelude::*;
 use bevy::window::PrimaryWindow;
 use bevy_gs4d::prelude::*;
 use bevy_gs4d::testing;
+use size::parse_size;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -44,10 +47,7 @@ fn main() -> Result {
             "--settle" => settle = number(option, values)?,
             "--size" => {
                 let text = value(option, "a size", values)?;
-                let sides = text.split_once('x').and_then(|(x, y)| Some(UVec2::new(x.parse().ok()?, y.parse().ok()?)));
-                size = sides
-                    .filter(|sides| sides.min_element() > 0)
-                    .ok_or_else(|| format!("--size {text}: not a size such as 640x360"))?;
+                size = parse_size(&text).ok_or_else(|| format!("--size {text}: not a size such as 640x360"))?;
             }
             _ => return Ok(false),
         }

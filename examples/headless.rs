@@ -8,6 +8,8 @@
 //! Defaults: `toybox.gs4d` from `assets/`, `out`, 8 pictures, 640x480. The capture may be a `.gs4d` or a `.pth`.
 
 mod common;
+#[path = "common/size.rs"]
+mod size;
 
 use bevy::core_pipeline::tonemapping::{DebandDither, Tonemapping};
 use bevy::prelude::*;
@@ -17,6 +19,7 @@ use bevy_gs4d::playback::Playback;
 use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugins, testing};
 use common::Orbit;
 use common::arguments::{Arguments, parse, value};
+use size::parse_size;
 use std::f32::consts::TAU;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -47,12 +50,6 @@ fn main() -> Result {
     let step = Duration::try_from_secs_f32(duration / arguments.frames.max(1) as f32)
         .map_err(|error| format!("a capture of {duration} s cannot be divided into pictures: {error}"))?;
     common::save_pictures(&mut app, arguments.frames, step, &arguments.headless.unwrap_or_default())
-}
-
-fn parse_size(text: &str) -> Option<UVec2> {
-    let (width, height) = text.split_once('x')?;
-    let size = UVec2::new(width.parse().ok()?, height.parse().ok()?);
-    (size.min_element() > 0).then_some(size)
 }
 
 fn setup(mut commands: Commands, assets: Res<AssetServer>, capture: Res<Capture>) {

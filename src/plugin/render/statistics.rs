@@ -84,8 +84,9 @@ impl CaptureStatistics {
     /// Returns the GPU time of captures in the newest measured frame, summed over all cameras, in seconds; 0 if it has
     /// not been measured.
     pub fn gpu_seconds(&self) -> f32 {
+        // The sum of nothing is −0.
         let milliseconds =
-            self.lock().views.iter().flat_map(|(_, view)| &view.passes).map(|pass| pass.milliseconds).sum::<f64>();
+            self.lock().views.iter().flat_map(|(_, view)| &view.passes).fold(0.0, |sum, pass| sum + pass.milliseconds);
         (milliseconds * 1e-3) as f32
     }
 
