@@ -46,7 +46,7 @@ async function open(query, width = 320, height = 180, seconds = 60) {
 
 // Draws at the full resolution, however long it takes.
 function whole(page) {
-  page.resolution.moving = page.resolution.still = 1;
+  page.quality.moving = page.quality.still = page.quality.kept = 1;
   page.redraw();
 }
 

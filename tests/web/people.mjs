@@ -362,9 +362,13 @@ await visit('waiting', '', async ({ page, check, had, until }) => {
   check('a slow device plays: a picture a second at least', rate >= 1 / busy, rate);
   const small = await page.evaluate(() => gs4d.share);
   check('the resolution is reduced', small < 0.6, small);
+  const few = await page.evaluate(() => gs4d.gaussians);
+  results.figures['share of the Gaussians while playing'] = few;
+  check('Gaussians are left out', few < 1, few);
   await page.keyboard.press(' ');
   await page.waitForFunction((small) => gs4d.share > small * 1.5, small, { timeout: 40000 });
   check('a paused picture gets sharper', true);
+  check('a paused picture has all Gaussians', (await page.evaluate(() => gs4d.gaussians)) === 1);
 }, { size: [1280, 720], hooks: "window.long = []; new PerformanceObserver((list) => long.push(...list.getEntries())).observe({ entryTypes: ['longtask'] });" });
 
 // Still captures -------------------------------------------------------------------------------------------------------

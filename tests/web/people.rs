@@ -99,7 +99,7 @@ fn the_page_around_keeps_its_wheel_and_gets_errors_and_times() {
 
 #[test]
 fn a_slow_device_plays_at_low_resolution_and_rests_at_full_resolution() {
-    check("waiting", 5);
+    check("waiting", 7);
     if let Some(found) = found() {
         println!("{}", found["figures"]);
     }

@@ -4,7 +4,7 @@
 import { Orbit } from './camera.js';
 import { Opener, Refusal, nameOf, request } from './files.js';
 import { at, dismiss, help, loading, refuse, say, toolbar } from './parts.js';
-import { Resolution } from './resolution.js';
+import { Quality } from './quality.js';
 import { framed, linkTo, listenAround, obedient, tell } from './around.js';
 
 const query = new URLSearchParams(location.search);
@@ -39,7 +39,7 @@ let before = 0;
 // 'drawn' when the first picture is on its way, true when it is there.
 let pictured = false;
 let background = 'trained';
-let resolution = new Resolution();
+let quality = new Quality();
 let drawn = null;
 let told = 0;
 let moved = 0;
@@ -155,14 +155,14 @@ function frame(now) {
   if (!player.is_ready()) return;
   finish(now);
   const moves = playing || now - moved < 200;
-  if (changed || (pictured === true && !moves && drawn && player.resize && resolution.sharper(drawn.share))) draw(moves);
+  if (changed || (pictured === true && !moves && drawn && player.resize && quality.sharper(drawn))) draw(moves);
 }
 
 // The device has finished a picture.
 function finish(now) {
   if (drawn?.start) {
     // The first picture compiles, and tells nothing about the next.
-    if (pictured === true) resolution.learn(now - drawn.start, drawn.share, drawn.moves);
+    if (pictured === true) quality.learn(now - drawn.start, drawn.share, drawn.moves);
     drawn.start = 0;
   }
   if (pictured !== 'drawn') return;
@@ -182,12 +182,14 @@ function draw(moves) {
   try {
     const [first, last] = about.interval;
     const time = duration() ? first + ((last - first) * seconds) / duration() : first;
-    const share = resolution.share(moves || pictured !== true);
+    const share = quality.share(moves || pictured !== true);
+    const gaussians = quality.gaussians(moves);
     const start = performance.now();
     fit(share);
+    player.set_share?.(gaussians);
     player.draw(time, orbit.pose(), orbit.lens(canvas.clientWidth, canvas.clientHeight));
     times.longestDraw = Math.max(times.longestDraw, performance.now() - start);
-    drawn = { start, share, moves };
+    drawn = { start, share, gaussians, moves };
     pictured ||= 'drawn';
   } catch (error) {
     play(false);
@@ -491,8 +493,8 @@ async function begin() {
     const isSoftware = Boolean(adapter.info?.isFallbackAdapter);
     const [width, height] = fullSize();
     const start = isSoftware ? Math.min(1, Math.sqrt(SMALL / (width * height))) : 1;
-    resolution = new Resolution(start, SMALLEST_SIDE / Math.min(width, height));
-    fit(resolution.share(true));
+    quality = new Quality(start, SMALLEST_SIDE / Math.min(width, height));
+    fit(quality.share(true));
     player = await Player.create(canvas, navigator.gpu.getPreferredCanvasFormat());
     player.resize?.(canvas.width, canvas.height);
     // Software drivers are faster with the other design.
@@ -529,8 +531,9 @@ window.gs4d = {
   get seconds() { return seconds; },
   get playing() { return playing; },
   get settled() { return !orbit || orbit.settled; },
-  get resolution() { return resolution; },
+  get quality() { return quality; },
   get share() { return drawn?.share ?? 0; },
+  get gaussians() { return drawn?.gaussians ?? 0; },
 };
 
 begin();

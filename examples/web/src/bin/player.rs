@@ -8,7 +8,7 @@ use bevy_gs4d::renderer::{
     ActiveList, CaptureUpload, Design, GpuCapture, GpuContext, Instance, Renderer, ShaderChecks, ViewParameters,
     ViewRenderer,
 };
-use bevy_gs4d::scene::RuntimeScene;
+use bevy_gs4d::scene::{Importances, RuntimeScene};
 use bevy_gs4d::view::{Appearance, Background, Optics, View};
 use glam::{Mat4, UVec2};
 use gs4d_web::{About, Faults, Opening, Step, report_panics, view};
@@ -43,6 +43,8 @@ pub struct Player {
     shown: Option<Shown>,
     /// The background in place of that of the capture.
     background: Option<[f32; 3]>,
+    /// The share of the Gaussians that is drawn.
+    share: f32,
     /// Whether the device has finished the last picture, and whether it has taken what was uploaded.
     finished: Arc<AtomicBool>,
     taken: Arc<AtomicBool>,
@@ -62,6 +64,7 @@ struct Kept {
     about: About,
     background: Background,
     optics: Optics,
+    importances: Importances,
 }
 
 /// The capture that is shown.
@@ -72,8 +75,12 @@ struct Shown {
 }
 
 impl Shown {
-    fn instance(&self, view: View) -> Instance<'_> {
-        Instance { capture: &self.capture, active: self.active.as_ref(), view, appearance: Appearance::default() }
+    /// Returns the capture in a view, thinned to the most important share of its Gaussians.
+    fn instance(&self, view: View, share: f32) -> Instance<'_> {
+        let importances = &self.kept.importances;
+        let thinning = importances.thinning(importances.least_of(share));
+        let appearance = Appearance { thinning, ..Appearance::default() };
+        Instance { capture: &self.capture, active: self.active.as_ref(), view, appearance }
     }
 
     fn parameters(&self, background: Option<[f32; 3]>) -> ViewParameters<'static> {
@@ -131,6 +138,7 @@ impl Player {
             opening,
             shown,
             background,
+            share: 1.0,
             finished,
             taken,
         })
@@ -157,6 +165,11 @@ impl Player {
         let design = Design::NAMES.iter().find(|(known, _)| *known == name).ok_or("no such design")?;
         self.view.set_design(&self.renderer, design.1);
         Ok(())
+    }
+
+    /// Sets the share of the Gaussians that is drawn, 0 to 1: the most important ones, larger and more opaque.
+    pub fn set_share(&mut self, share: f32) {
+        self.share = share;
     }
 
     /// Begins to open a file, whose length is 0 if it is not known. The capture that is shown stays until the file is
@@ -198,6 +211,7 @@ impl Player {
                     about: About::of(&scene),
                     background: scene.trained_background(),
                     optics: scene.trained_with.optics(),
+                    importances: Importances::of(&scene),
                 };
                 let upload = CaptureUpload::new(device, &self.renderer, *scene).map_err(|e| e.to_string())?;
                 ViewRenderer::check_room(device, upload.most_drawn()).map_err(|e| e.to_string())?;
@@ -234,7 +248,7 @@ impl Player {
                     device,
                     queue,
                     &self.renderer,
-                    &[shown.instance(view)],
+                    &[shown.instance(view, self.share)],
                     &shown.parameters(self.background),
                 );
                 prepared.map_err(|e| e.to_string())?;
@@ -283,7 +297,7 @@ impl Player {
         {
             active.record(&self.renderer, &mut encoder, &shown.capture);
         }
-        let (instances, parameters) = ([shown.instance(view)], shown.parameters(self.background));
+        let (instances, parameters) = ([shown.instance(view, self.share)], shown.parameters(self.background));
         self.view.prepare(device, queue, &self.renderer, &instances, &parameters).map_err(|e| e.to_string())?;
         self.view.record(&self.renderer, &mut encoder, &instances);
         let canvas = match self.surface.get_current_texture() {

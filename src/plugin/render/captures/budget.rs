@@ -3,10 +3,9 @@
 //! In: [`CaptureBudget`], the GPU times of [`CaptureStatistics`], the time of the frame; for each capture in a view,
 //! its [`Importances`] and its place. Out: the [`Thinning`] of each capture in each view, which changes slowly.
 
-use super::importances::Importances;
 use super::steering::Steering;
 use crate::plugin::render::statistics::CaptureStatistics;
-use crate::scene::Bounds;
+use crate::scene::{Bounds, Importances};
 use crate::view::{Thinning, View};
 use bevy::ecs::reflect::ReflectResource;
 use bevy::ecs::resource::Resource;
@@ -105,7 +104,7 @@ impl CaptureCut {
     pub(crate) fn thinning(&self, view: &View, thinned: &ThinnedCapture<'_>, priority: f32) -> Thinning {
         let [wanted, most] = self.least(view, thinned, priority);
         let least = wanted.min(most);
-        if least > 0.0 { Thinning::new(least, thinned.importances.share_above(least)) } else { Thinning::default() }
+        thinned.importances.thinning(least)
     }
 
     /// Returns the least importance that is drawn by the size on the screen, and that of the smallest share.

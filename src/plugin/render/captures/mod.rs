@@ -8,7 +8,6 @@ pub(crate) mod back_off;
 pub(crate) mod budget;
 pub(crate) mod detail;
 pub(crate) mod extract;
-mod importances;
 pub(crate) mod previous;
 mod steering;
 pub(crate) mod upload;

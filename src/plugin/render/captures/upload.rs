@@ -6,14 +6,13 @@
 //! it, or no view could draw the capture.
 
 use super::budget::ThinnedCapture;
-use super::importances::Importances;
 use crate::plugin::asset::{CaptureFailure, Uploads};
 use crate::plugin::component::GaussianCapture;
 use crate::plugin::render::renderer::CaptureRenderer;
 use crate::plugin::render::statistics::CaptureStatistics;
 use crate::renderer::device::memory::{Caught, catch, catch_known};
 use crate::renderer::{CaptureUpload, GpuCapture, GpuError, Storage, ViewRenderer};
-use crate::scene::{Bounds, Level, RuntimeScene};
+use crate::scene::{Bounds, Importances, Level, RuntimeScene};
 use crate::view::Optics;
 use bevy::asset::{AssetId, AssetServer, RenderAssetUsages};
 use bevy::ecs::reflect::ReflectResource;

@@ -4,19 +4,34 @@
 //! [importance](crate::gaussian::Gaussian::importance) of its Gaussians, which tells the share of them above an
 //! importance, and the least importance with which a share of them is drawn.
 
-use crate::scene::RuntimeScene;
+use super::RuntimeScene;
 use crate::view::Thinning;
 
 /// Most Gaussians in the sample: a share is then exact to a hundredth.
 const SAMPLE: usize = 4096;
 
-/// A sample of the importances of a capture's Gaussians, capture units, descending; empty for an empty capture.
+/// The [importances](crate::gaussian::Gaussian::importance) of a capture's Gaussians, capture units: a sample of at most
+/// 4,096, in descending order; empty for an empty capture.
+///
+/// # Examples
+///
+/// The most important quarter of a capture, for a device that is too slow for all of it:
+///
+/// ```
+/// use bevy_gs4d::scene::{Importances, synth::{SynthSettings, synthesize}};
+///
+/// let scene = synthesize(&SynthSettings { count: 1000, ..SynthSettings::default() }).into_runtime()?;
+/// let importances = Importances::of(&scene);
+/// let thinning = importances.thinning(importances.least_of(0.25));
+/// assert_eq!(thinning.weight(0.0), 0.0, "the least important Gaussians are not drawn");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(in crate::plugin::render) struct Importances(Vec<f32>);
+pub struct Importances(Vec<f32>);
 
 impl Importances {
     /// Returns the importances of Gaussians at even steps through a capture. At most 4,096 are decoded.
-    pub(in crate::plugin::render) fn of(scene: &RuntimeScene) -> Self {
+    pub fn of(scene: &RuntimeScene) -> Self {
         let count = scene.len().min(SAMPLE);
         let of_sample = |step: usize| scene.gaussian((step as u64 * scene.len() as u64 / count as u64) as usize);
         let mut sample: Vec<f32> = (0..count).map(|step| of_sample(step).importance()).collect();
@@ -25,7 +40,7 @@ impl Importances {
     }
 
     /// Returns the share of the Gaussians that are more important than `least`, from 0 to 1.
-    pub(in crate::plugin::render) fn share_above(&self, least: f32) -> f32 {
+    pub fn share_above(&self, least: f32) -> f32 {
         let Self(sample) = self;
         let above = sample.partition_point(|importance| *importance > least);
         // Linear between two of the sample, so that a small change of `least` is a small change of the share.
@@ -36,9 +51,14 @@ impl Importances {
         (above as f32 + between.clamp(0.0, 1.0)) / (sample.len().max(1) as f32)
     }
 
+    /// Returns the thinning to the Gaussians that are more important than `least`; all, unchanged, if it is 0 or less.
+    pub fn thinning(&self, least: f32) -> Thinning {
+        if least > 0.0 { Thinning::new(least, self.share_above(least)) } else { Thinning::default() }
+    }
+
     /// Returns the [least importance](Thinning::least) with which about this share of the Gaussians, and at least one of
     /// the sample, is drawn whole; 0 if it is all of them. A share that is not a number counts as 0.
-    pub(in crate::plugin::render) fn least_of(&self, share: f32) -> f32 {
+    pub fn least_of(&self, share: f32) -> f32 {
         let Self(sample) = self;
         let count = (share * sample.len() as f32).ceil().max(1.0) as usize;
         if count >= sample.len() { 0.0 } else { sample[count - 1] / Thinning::FULL }
@@ -62,7 +82,7 @@ mod tests {
         let all: Vec<f32> = scene.iter().map(|gaussian| gaussian.importance()).collect();
         for share in [0.05, 0.3, 0.5, 0.9] {
             let least = importances.least_of(share);
-            let thinning = Thinning::new(least, share);
+            let thinning = importances.thinning(least);
             let whole = all.iter().filter(|importance| thinning.weight(**importance) > 0.999).count();
             let whole = whole as f32 / all.len() as f32;
             assert!((whole - share).abs() < 0.02, "{whole} of all Gaussians are drawn whole, {share} of the sample");
@@ -100,7 +120,7 @@ mod tests {
             let importances = Importances(sample.clone());
             for share in [0.0, 1.0 / 16.0, f32::NAN] {
                 let least = importances.least_of(share);
-                let thinning = Thinning::new(least, importances.share_above(least));
+                let thinning = importances.thinning(least);
                 let most = thinning.weight(sample[0]);
                 assert!(most > 0.999, "the most important of {sample:?} has the weight {most} at a share of {share}");
             }
