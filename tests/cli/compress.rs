@@ -46,6 +46,22 @@ fn a_scene_that_cannot_be_packed_does_not_change_the_existing_package() {
 }
 
 #[test]
+fn progressive_packages_have_layers_that_can_be_drawn_early() {
+    let folder = folder();
+    let (input, out) = (scene(&folder, "3000"), folder.path().join("out.gs4d"));
+    let compress = arguments!["compress", &input, &out, "--verify", "0", "--codebooks", "64"].to_vec();
+    for (option, layers) in [(None, 1), (Some("--progressive".into()), 3)] {
+        gs4d(&compress.iter().cloned().chain(option).collect::<Vec<_>>()).text();
+        let info = gs4d(&arguments!["info", &out, "--json"]).json();
+        let ends: Vec<u64> = serde_json::from_value(info["package"]["layers"].clone()).expect("numbers of bytes");
+        assert_eq!(ends.len(), layers, "the layers: {info}");
+        let text = gs4d(&arguments!["info", &out]).text();
+        let share = format!("after {:.0} %", 100.0 * ends[0] as f64 / info["bytes"].as_f64().expect("the size"));
+        assert!(text.contains("drawn coarsely") && text.contains(&share), "{share} is told: {text}");
+    }
+}
+
+#[test]
 fn color_steps_are_normal_numbers_and_leave_colors_finite() {
     let folder = folder();
     let (input, out) = (scene(&folder, "300"), folder.path().join("out.gs4d"));

@@ -37,6 +37,7 @@ const REFUSED: &[(&str, &str)] = &[
     ("compress a b --quality lossless --base-bits 3", "--base-bits has no effect with --quality lossless"),
     ("compress a b --quality lossless --escape 0.1", "--escape has no effect with --quality lossless"),
     ("compress a b --quality lossless --color-step 0.1", "--color-step has no effect with --quality lossless"),
+    ("compress a b --quality lossless --progressive", "--progressive has no effect with the quality lossless"),
     ("compress a b --quality lossless --codebooks 4", "--codebooks has no effect with --quality lossless"),
     ("compress a b --quality lossless --weights w.f32", "--weights has no effect with --quality lossless"),
     ("compress a b --codebooks 4 --color-step 0.1", "--color-step has no effect on colors that are coded by codebooks"),
@@ -166,6 +167,11 @@ const REFUSED: &[(&str, &str)] = &[
     // finetune
     ("finetune a -o o --data d --validation none --patience 3", "--patience has no effect without validation views"),
     ("finetune a -o o --data d --compress-steps 3", "the following required arguments were not provided"),
+    ("finetune a -o o --data d --progressive", "the following required arguments were not provided"),
+    (
+        "finetune a -o o --data d --compress lossless --progressive",
+        "--progressive has no effect with the quality lossless",
+    ),
     ("finetune a -o o --data d --round-geometry", "the following required arguments were not provided"),
     (
         "finetune a -o o --data d --compress visually-lossless --compress-steps 3",
@@ -176,6 +182,7 @@ const REFUSED: &[(&str, &str)] = &[
         "--round-geometry has no effect with a quality without codebooks",
     ),
     // bake
+    ("bake a -o o --data d --quality lossless --progressive", "--progressive has no effect with the quality lossless"),
     (
         "bake a -o o --data d --no-fine-tune --steps 3",
         "the argument '--no-fine-tune' cannot be used with '--steps <N>'",
@@ -895,11 +902,12 @@ fn a_bake_of_a_package_in_the_runtime_form_has_the_quality_asked_for() {
     let capture = Capture::new(trained, Vec3::ZERO, 3, 2, UVec2::splat(32), true);
     let (runtime, out) = (capture.path("runtime.gs4d"), capture.path("out.gs4d"));
     gs4d(&arguments!["convert", &capture.scene, &runtime, "--form", "runtime"]).text();
-    let goal = arguments!["--ratio", "0.5", "--variant", "energy", "--engine", "cpu", "--quality", "small"];
-    let fixed = arguments!["bake", &runtime, "--data", &capture.data, "-o", &out];
+    let goal = arguments!["--ratio", "0.1", "--variant", "energy", "--engine", "cpu", "--quality", "small"];
+    let fixed = arguments!["bake", &runtime, "--data", &capture.data, "-o", &out, "--progressive"];
     gs4d(&[fixed.to_vec(), goal.to_vec()].concat()).text();
     let info = gs4d(&arguments!["info", &out, "--json"]).json();
-    assert_eq!((&info["form"], &info["gaussians"]), (&"packed".into(), &150.into()), "compressed: {info}");
+    assert_eq!((&info["form"], &info["gaussians"]), (&"packed".into(), &270.into()), "compressed: {info}");
+    assert_eq!(info["package"]["layers"].as_array().map(Vec::len), Some(2), "a block is in the first layer: {info}");
 }
 
 #[test]

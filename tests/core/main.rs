@@ -5,6 +5,7 @@
 //! folder. Out: one test binary. The header of each module describes its tests.
 
 mod antialias;
+mod beginning;
 mod checkpoint;
 mod checkpoint_poison;
 #[cfg(feature = "offline")]

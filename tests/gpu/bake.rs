@@ -48,6 +48,7 @@ impl Capture {
             key_frames: KeyFrames::default(),
             fine_tune: Some(FineTuneSettings { steps: 6, evaluate_every: 2, ..FineTuneSettings::default() }),
             quality: Quality::Lossless,
+            progressive: false,
             level: None,
             trust_images: false,
             keep_work: false,

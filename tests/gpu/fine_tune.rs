@@ -15,7 +15,7 @@ use bevy_gs4d::internal::offline::train::{
 use bevy_gs4d::internal::offline::train::{adam, environment_backward, loss, neighbors};
 use bevy_gs4d::internal::reference::{PixelGradients, gradients};
 use bevy_gs4d::internal::scene::Bits;
-use bevy_gs4d::offline::compress::{CompressSettings, compress};
+use bevy_gs4d::offline::compress::{CompressSettings, Quality, compress};
 use bevy_gs4d::offline::dataset::CoveredImage;
 use bevy_gs4d::offline::measure::SquaredError;
 use bevy_gs4d::offline::train::{FineTuneSettings, Rates, Terms};
@@ -603,7 +603,12 @@ const COARSE: Bits =
 
 /// Returns the pictures of a scene that is packed with these bits, with unchanged colors.
 fn packed_pictures(headless: &mut Headless, scene: GaussianScene, views: &[View]) -> Vec<Picture> {
-    let settings = CompressSettings { geometry: Some(COARSE), codebooks: Vec::new(), color_step: 0.0, weights: None };
+    let settings = CompressSettings {
+        geometry: Some(COARSE),
+        codebooks: Vec::new(),
+        color_step: 0.0,
+        ..CompressSettings::from(Quality::Lossless)
+    };
     let (packed, _) =
         compress(scene.into_runtime().expect("the scene can be drawn"), &settings).expect("compression succeeds");
     let capture =

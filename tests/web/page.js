@@ -12,7 +12,7 @@ async function until(what, holds, seconds = 60) {
 const frames = new Map();
 addEventListener('message', (event) => frames.get(event.source)?.push(event.data));
 
-// Opens a player, and waits for its first picture or its refusal.
+// Opens a player, and waits for its first picture, once the whole capture is there, or its refusal.
 async function open(query, width = 320, height = 180, seconds = 60) {
   const frame = document.createElement('iframe');
   Object.assign(frame.style, { width: `${width}px`, height: `${height}px`, border: 0 });
@@ -21,12 +21,13 @@ async function open(query, width = 320, height = 180, seconds = 60) {
   const events = [];
   frames.set(frame.contentWindow, events);
   frame.src = `/page/index.html?${query}`;
-  await until(`a picture or a message of ?${query}`, () => events.some((event) => event.gs4d === 'picture' || event.gs4d === 'error'), seconds);
+  const had = (event) => events.filter((one) => one.gs4d === event);
+  const isDone = () => had('error').length > 0 || (had('loaded').length > 0 && had('picture').length > 0);
+  await until(`a picture or a message of ?${query}`, isDone, seconds);
   const inside = frame.contentWindow;
   const at = (id) => inside.document.getElementById(id);
   return {
-    frame, events, inside, at, page: inside.gs4d,
-    had: (event) => events.filter((one) => one.gs4d === event),
+    frame, events, inside, at, had, page: inside.gs4d,
     tell: (gs4d, value, more) => inside.postMessage({ gs4d, value, ...more }, '*'),
     key: (key, target = inside.document.body) => target.dispatchEvent(new inside.KeyboardEvent('keydown', { key, bubbles: true, cancelable: true })),
     // Of the view that the camera has eased to, at the full resolution.

@@ -1,4 +1,4 @@
-// People at the page: keyboard alone, a phone, forced colors, another page around, slow devices, broken files.
+// People at the page: keyboard alone, a phone, forced colors, another page around, slow devices, slow links, broken files.
 // In: node people.mjs FOLDER MODULES BROWSER [SHOTS]: the folder of the built page, node_modules with playwright-core and axe-core, the browser's program,
 // perhaps a folder for screenshots. Out: one JSON object on standard output: groups of checks, each true or what was found instead.
 
@@ -19,6 +19,18 @@ const axe = await readFile(join(modules, 'axe-core/axe.min.js'), 'utf8');
 const KINDS = { html: 'text/html; charset=utf-8', js: 'text/javascript', css: 'text/css', wasm: 'application/wasm', jpg: 'image/jpeg' };
 const toybox = await readFile(join(folder, 'toybox.gs4d'));
 const still = process.env.GS4D_STILL ? await readFile(process.env.GS4D_STILL) : null;
+// A package in layers, the bytes up to the end of the first one, and the same package with damage at its end.
+const progressive = process.env.GS4D_PROGRESSIVE ? await readFile(process.env.GS4D_PROGRESSIVE) : null;
+const layer = Number(process.env.GS4D_LAYER);
+const spoiled = progressive && Buffer.from(progressive);
+if (spoiled) spoiled[spoiled.length - 3] ^= 0x55;
+// What follows a first layer, once a test asks for it.
+const rests = {
+  'progressive.gs4d': (response) => response.end(progressive.subarray(layer)),
+  'torn.gs4d': (response) => response.destroy(),
+  'spoiled.gs4d': (response) => response.end(spoiled.subarray(layer)),
+};
+let release = () => {};
 
 // A page around, taller than the screen, that notes what the player tells.
 const around = (query, allow) => `<!doctype html><title>around</title><h1>Around</h1>
@@ -48,6 +60,19 @@ const server = createServer(async (request, response) => {
   if (path === 'page.gs4d') return send(Buffer.from('<!DOCTYPE html><title>Sign in</title>'), KINDS.html);
   if (path === 'junk.gs4d') return send(Buffer.from('something else entirely'));
   if (path === 'still.gs4d' && still) return send(still);
+  if (Object.hasOwn(rests, path) && progressive) {
+    response.writeHead(200, { 'Content-Length': progressive.length });
+    response.write(progressive.subarray(0, layer >> 1));
+    // The page takes the link for a slow one, and does not wait for the rest of the file.
+    await new Promise((done) => setTimeout(done, 1500));
+    response.write(progressive.subarray(layer >> 1, layer));
+    release = () => rests[path](response);
+    return;
+  }
+  if (path === 'release') {
+    release();
+    return send(Buffer.alloc(0));
+  }
   try {
     send(await readFile(join(folder, path.replaceAll('..', ''))), KINDS[path.split('.').pop()]);
   } catch {
@@ -77,7 +102,7 @@ async function visit(group, query, work, { size = [480, 270], media = {}, hooks 
   await context.grantPermissions(['clipboard-read', 'clipboard-write']);
   const page = await context.newPage();
   const checks = (results[group] ??= {});
-  await page.addInitScript(`window.told = []; for (const name of ['ready', 'progress', 'loaded', 'picture', 'playing', 'paused', 'ended', 'time', 'error'])
+  await page.addInitScript(`window.told = []; for (const name of ['ready', 'progress', 'preview', 'loaded', 'picture', 'playing', 'paused', 'ended', 'time', 'error'])
     addEventListener('gs4d-' + name, (event) => told.push({ gs4d: name, at: performance.now(), ...event.detail })); ${hooks}`);
   const had = (name) => page.evaluate((name) => told.filter((one) => one.gs4d === name), name);
   const until = (name, count = 1, timeout = 60000) => page.waitForFunction(([name, count]) => told.filter((one) => one.gs4d === name).length >= count, [name, count], { timeout });
@@ -96,6 +121,8 @@ async function visit(group, query, work, { size = [480, 270], media = {}, hooks 
 
 const text = (page, id) => page.locator(`#${id}`).textContent();
 const seconds = (page) => page.evaluate(() => gs4d.seconds);
+// In a page, or in a frame of one.
+const camera = (page) => page.evaluate(() => new URL(gs4d.link()).searchParams.get('camera'));
 
 // Accessibility --------------------------------------------------------------------------------------------------------
 
@@ -155,13 +182,12 @@ await visit('keyboard', 'autoplay=0', async ({ page, check, until }) => {
   check('the clock is no live region', await page.evaluate(() => !document.getElementById('time').closest('[aria-live], output, [role=status], [role=timer]')));
   check('the view takes arrow keys from screen readers', (await page.getAttribute('#canvas', 'role')) === 'application');
   await page.locator('#canvas').focus();
-  const camera = () => page.evaluate(() => new URL(gs4d.link()).searchParams.get('camera'));
-  let before = await camera();
+  let before = await camera(page);
   for (const key of ['ArrowLeft', 'w', 'd', 'q', '+']) {
     await page.keyboard.down(key);
     await page.waitForFunction((before) => new URL(gs4d.link()).searchParams.get('camera') !== before, before, { timeout: 5000 }).catch(() => {});
     await page.keyboard.up(key);
-    const now = await camera();
+    const now = await camera(page);
     check(`${key} moves the camera`, now !== before, now);
     before = now;
   }
@@ -306,12 +332,11 @@ await visit('embedding', 'query=autoplay%3D0', async ({ page, check }) => {
   await page.waitForTimeout(1500);
   await page.evaluate(() => scrollTo(0, 0));
   await page.waitForTimeout(1000);
-  const camera = () => frame.evaluate(() => new URL(gs4d.link()).searchParams.get('camera'));
   await frame.locator('#canvas').click({ position: { x: 200, y: 70 } });
-  const before = await camera();
+  const before = await camera(frame);
   await page.mouse.wheel(0, 300);
   await frame.waitForFunction((before) => new URL(gs4d.link()).searchParams.get('camera') !== before, before, { timeout: 5000 }).catch(() => {});
-  check('after a click the wheel zooms', (await camera()) !== before);
+  check('after a click the wheel zooms', (await camera(frame)) !== before);
   check('and does not scroll the page around', (await page.evaluate(() => scrollY)) === 0);
   for (const data of [{ gs4d: 'seek', value: 'nonsense' }, { gs4d: 'seek' }, { gs4d: 'fly' }, { gs4d: 'camera', value: 'x' }, { gs4d: 'open', value: 7 }]) {
     const errors = (await had('error')).length;
@@ -377,6 +402,77 @@ await visit('waiting', '', async ({ page, check, had, until }) => {
   check('a paused picture gets sharper', true);
   check('a paused picture has all Gaussians', (await page.evaluate(() => gs4d.gaussians)) === 1);
 }, { size: [1280, 720], hooks: "window.long = []; new PerformanceObserver((list) => long.push(...list.getEntries())).observe({ entryTypes: ['longtask'] });" });
+
+// Slow links -----------------------------------------------------------------------------------------------------------
+
+const recorder = await readFile(new URL('hooks.js', import.meta.url), 'utf8');
+// The share of the pixels of the next picture that are not black.
+const drawn = (page) => page.evaluate(async () => {
+  const picture = window.picture();
+  gs4d.redraw();
+  const pixels = await picture;
+  let count = 0;
+  for (let i = 0; i < pixels.length; i += 4) count += Math.max(pixels[i], pixels[i + 1], pixels[i + 2]) > 30;
+  return (4 * count) / pixels.length;
+});
+
+if (progressive) {
+  await visit('beginning', 'capture=progressive.gs4d&autoplay=0', async ({ page, check, had, until, shot }) => {
+    await until('picture');
+    const early = await had('preview');
+    check('a picture comes before all of the file', early.length === 1 && (await had('loaded')).length === 0, early);
+    const share = await drawn(page);
+    check('it is not black', share > 0.05, share);
+    check('the name is shown', (await text(page, 'title')) === 'progressive');
+    const said = await text(page, 'loading-text');
+    check('the page tells that it still receives the file', /progressive\.gs4d \d+ %/.test(said) && (await page.locator('#loading').isVisible()), said);
+    const first = await camera(page);
+    await page.locator('#canvas').focus();
+    await page.keyboard.press('ArrowLeft');
+    await page.evaluate(() => gs4d.seek(1.25));
+    const turned = await camera(page);
+    check('the camera can be moved', turned !== first, turned);
+    await shot('beginning');
+    await page.evaluate(async () => void (await fetch('release')));
+    await until('loaded');
+    const whole = (await had('loaded'))[0];
+    check('the first picture has fewer Gaussians', early[0].gaussians > 0 && early[0].gaussians < whole.gaussians, [early, whole]);
+    check('the whole capture is shown', (await page.evaluate(() => gs4d.about.gaussians)) === whole.gaussians, whole);
+    check('the camera stays', (await camera(page)) === turned, await camera(page));
+    check('the time stays', (await seconds(page)) === 1.25, await seconds(page));
+    check('it does not play', !(await page.evaluate(() => gs4d.playing)));
+    check('no progress is told any more', await page.locator('#loading').isHidden());
+    const last = await drawn(page);
+    check('the picture of all is not black', last > 0.05, last);
+    check('there is one first picture', (await had('picture')).length === 1);
+    await shot('beginning-whole');
+  }, { hooks: recorder });
+
+  await visit('beginning', 'capture=torn.gs4d', async ({ page, check, had, until }) => {
+    await until('picture');
+    const first = (await had('picture'))[0];
+    const early = (await had('time')).filter((one) => one.at < first.at);
+    check('the clock stands until the first picture', early.every((one) => one.seconds === 0), early);
+    await until('time');
+    check('the beginning plays', await page.evaluate(() => gs4d.playing));
+    await page.evaluate(async () => void (await fetch('release')));
+    await until('error');
+    let said = await text(page, 'text');
+    check('a file that is cut off after its first layer is told', said.includes('torn.gs4d') && said.includes('connection ended after'), said);
+    check('its beginning still plays', (await page.evaluate(() => gs4d.playing)) && (await had('playing')).length === 1);
+    await page.locator('#close').click();
+    check('the message can be closed', await page.locator('#message').isHidden());
+    const before = (await had('preview')).length;
+    await page.evaluate(() => void gs4d.openAddress('spoiled.gs4d'));
+    await until('preview', before + 1);
+    await page.evaluate(async () => void (await fetch('release')));
+    await until('error', 2);
+    said = await text(page, 'text');
+    check('damage behind the first layer is told', said.includes('spoiled.gs4d'), said);
+    const about = await page.evaluate(() => gs4d.about.gaussians);
+    check('its beginning stays', about === (await had('preview')).at(-1).gaussians && (await had('loaded')).length === 0, about);
+  });
+}
 
 // Still captures -------------------------------------------------------------------------------------------------------
 

@@ -1,5 +1,5 @@
 //! Use of the page by people: with a keyboard alone, on a phone, in forced colors, inside another page, on slow
-//! devices, with broken files.
+//! devices, over slow links, with broken files.
 //!
 //! In: the built page, Chromium, Node.js, and the programs of npm that `GS4D_WEB_TOOLS` names
 //! (`examples/web/package.json`). Out: groups of checks that `people.mjs` has made, each true or what was found
@@ -7,9 +7,9 @@
 
 use crate::support::skip::skip;
 use crate::{browser, busy};
-use bevy_gs4d::codec::package::{self, WriteSettings};
-use bevy_gs4d::scene::PlaybackHints;
+use bevy_gs4d::codec::package::{self, Beginning, WriteSettings};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use bevy_gs4d::scene::{GaussianScene, Packing, PlaybackHints};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -37,12 +37,16 @@ fn found() -> Option<&'static Value> {
 
 fn run(folder: &Path, tools: &Path, program: &Path) -> Result<Value, String> {
     let scratch = tempfile::tempdir().map_err(|error| error.to_string())?;
-    let still = scratch.path().join("still.gs4d");
-    std::fs::write(&still, a_still()).map_err(|error| error.to_string())?;
+    let [still, progressive] = ["still.gs4d", "progressive.gs4d"].map(|name| scratch.path().join(name));
+    let (package, layer) = a_progressive();
+    for (path, bytes) in [(&still, a_still()), (&progressive, package)] {
+        std::fs::write(path, bytes).map_err(|error| error.to_string())?;
+    }
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/web/people.mjs");
     let mut command = Command::new("node");
     command.arg(script).args([folder, tools, program]).args(std::env::var_os("GS4D_WEB_SHOTS"));
-    let output = command.env("GS4D_STILL", still).env("GS4D_BUSY", busy().to_string()).output();
+    command.env("GS4D_STILL", still).env("GS4D_PROGRESSIVE", progressive).env("GS4D_LAYER", layer.to_string());
+    let output = command.env("GS4D_BUSY", busy().to_string()).output();
     let output = output.map_err(|error| format!("node does not run: {error}"))?;
     let said = String::from_utf8_lossy(&output.stderr);
     println!("{said}");
@@ -56,6 +60,18 @@ fn a_still() -> Vec<u8> {
     let mut package = Vec::new();
     package::write(&mut package, &scene, &WriteSettings::default()).expect("a synthetic scene can be written");
     package
+}
+
+/// Returns a package in layers, and the bytes after which the first of them can be drawn.
+fn a_progressive() -> (Vec<u8>, usize) {
+    let scene = synthesize(&SynthSettings { count: 30_000, degree: 1, ..SynthSettings::default() });
+    let scene = scene.into_runtime().expect("a synthetic scene can be drawn");
+    let packed = scene.pack(&Packing { progressive: true, ..Packing::default() }).expect("its values fit");
+    let mut package = Vec::new();
+    package::write(&mut package, &GaussianScene::from(packed), &WriteSettings::default()).expect("it can be written");
+    let beginning = Beginning::of(&package).expect("the header is intact").expect("the header is whole");
+    let layer = *beginning.layers().first().expect("the first layer can be drawn before the others");
+    (package, layer)
 }
 
 /// Checks a group, whose checks are all true.
@@ -103,6 +119,11 @@ fn a_slow_device_plays_at_low_resolution_and_rests_at_full_resolution() {
     if let Some(found) = found() {
         println!("{}", found["figures"]);
     }
+}
+
+#[test]
+fn a_slow_link_shows_the_beginning_of_a_capture() {
+    check("beginning", 20);
 }
 
 #[test]

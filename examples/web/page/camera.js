@@ -28,14 +28,19 @@ export class Orbit {
   constructor(about, eased = true) {
     this.up = unit([...about.up]);
     this.eased = eased;
+    this.surround(about);
+    this.wanted = copy(this.first);
+    this.now = copy(this.first);
+    this.given = null;
+  }
+
+  // Sets the first camera, and how near and far others may be. The camera stays where it is.
+  surround(about) {
     // The whole core is in view, as in native orbits; scenes of millimeters have no room for the near limit of others.
     const radius = about.radius > 0 ? about.radius : 1;
     this.limits = [radius * 0.01, Math.max(1e4, radius * 100)];
     const distance = radius < 0.1 ? radius / Math.sin(HALF_FIELD_OF_VIEW) + 2 * radius : radius / Math.sin(HALF_FIELD_OF_VIEW) + 0.2;
     this.first = { yaw: 0, pitch: 0.35, target: [...about.center], distance };
-    this.wanted = copy(this.first);
-    this.now = copy(this.first);
-    this.given = null;
   }
 
   // Goes to where it is wanted, at once.

@@ -1,8 +1,11 @@
 // Files of captures: from an address or this device into the player.
-// In: an address, a file, bytes. Out: what there is to tell about the capture once it is shown; progress; a sentence that says what was wrong and what to do.
+// In: an address, a file, bytes. Out: what there is to tell about the capture once it is shown, and about its beginning before that; progress; a
+// sentence that says what was wrong and what to do.
 
 // Milliseconds of a slice of loading: the page draws and answers between slices.
 const SLICE = 8;
+// Milliseconds: if the rest of a file takes longer than this to arrive, its beginning is shown meanwhile.
+const PATIENT = 1000;
 
 // A file that was not opened; `again` is whether trying again can help.
 export class Refusal extends Error {
@@ -94,8 +97,9 @@ export class Opener {
     return result;
   }
 
-  // Opens the file whose stream and length a promise gives. Returns what there is to tell about it; null if it was cancelled or replaced.
-  async open(name, begin) {
+  // Opens the file whose stream and length a promise gives. `preview` gets what there is to tell about each beginning of the file that is shown. Returns
+  // what there is to tell about the file; null if it was cancelled or replaced.
+  async open(name, begin, preview) {
     this.cancel();
     const own = new AbortController();
     this.own = own;
@@ -103,7 +107,7 @@ export class Opener {
       this.report({ name, part: 0, bytes: 0, total: 0, state: 'receiving' });
       const { stream, length } = await begin(own.signal);
       if (own.signal.aborted) return null;
-      await this.receive(name, stream, length, own.signal);
+      await this.receive(name, stream, length, own.signal, preview);
       return own.signal.aborted ? null : await this.read(name, own.signal);
     } catch (error) {
       if (own.signal.aborted) return null;
@@ -113,42 +117,57 @@ export class Opener {
     }
   }
 
-  async receive(name, stream, length, signal) {
+  async receive(name, stream, length, signal, preview) {
     const reader = stream.getReader();
     signal.addEventListener('abort', () => reader.cancel().catch(() => {}), { once: true });
     this.slice(() => this.player.open(name, length));
-    let received = 0;
+    // Bytes, and milliseconds that the page waited for them.
+    let [received, waited] = [0, 0];
     const cut = () => {
       const of = length ? ` of ${megabytes(length)}` : '';
       return new Refusal(`${name} was not opened: the connection ended after ${megabytes(received)}${of}.`, true);
     };
     for (;;) {
+      const asked = performance.now();
       const { done, value } = await reader.read().catch((error) => {
         if (signal.aborted) throw error;
         throw cut();
       });
       if (signal.aborted) return;
       if (done) break;
+      waited += performance.now() - asked;
       const wrong = received === 0 ? misnomer(value) : '';
       if (wrong) throw new Refusal(`${name} ${wrong}.`);
       this.slice(() => this.player.receive(value));
       received += value.length;
       this.report({ name, part: length ? 0.7 * Math.min(1, received / length) : 0.35, bytes: received, total: length, state: 'receiving' });
+      // A file of unknown length may take as long again.
+      const left = length ? waited * (length / received - 1) : waited;
+      if (left < PATIENT || !this.slice(() => this.player.begin_preview?.())) continue;
+      // What is wrong with a beginning is told when all of the file has been received.
+      const found = await this.steps(() => this.player.step_preview(), signal).catch(() => null);
+      if (signal.aborted) return;
+      if (found) preview(found);
     }
     if (received === 0) throw new Refusal(`${name} is empty: it has no byte.`);
     if (received < length) throw cut();
   }
 
-  async read(name, signal) {
+  read(name, signal) {
+    return this.steps(() => this.player.step(), signal, () => this.report({ name, part: 0.7 + 0.29 * this.player.progress(), state: 'reading' }));
+  }
+
+  // Does steps until one has a result, and returns it; null if that was cancelled. `between` is called after each slice.
+  async steps(step, signal, between = () => {}) {
     for (;;) {
       const found = this.slice((hasTime) => {
-        let step;
-        do step = this.player.step();
-        while (!step && !this.player.waits() && hasTime());
-        return step;
+        let result;
+        do result = step();
+        while (!result && !this.player.waits() && hasTime());
+        return result;
       });
       if (found) return found;
-      this.report({ name, part: 0.7 + 0.29 * this.player.progress(), state: 'reading' });
+      between();
       await (this.player.waits() ? new Promise((resolve) => setTimeout(resolve, 1)) : pause());
       if (signal.aborted) return null;
     }

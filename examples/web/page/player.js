@@ -38,6 +38,8 @@ let changed = false;
 let before = 0;
 // 'drawn' when the first picture is on its way, true when it is there.
 let pictured = false;
+// Whether the time of the next picture tells about those after it: the first picture of a capture compiles.
+let learns = false;
 let background = 'trained';
 let quality = new Quality();
 let drawn = null;
@@ -161,8 +163,7 @@ function frame(now) {
 // The device has finished a picture.
 function finish(now) {
   if (drawn?.start) {
-    // The first picture compiles, and tells nothing about the next.
-    if (pictured === true) quality.learn(now - drawn.start, drawn.share, drawn.moves);
+    quality.learn(now - drawn.start, drawn.share, drawn.moves);
     drawn.start = 0;
   }
   if (pictured !== 'drawn') return;
@@ -170,7 +171,8 @@ function finish(now) {
   // A small first picture is followed by one whose time tells how much larger the next may be.
   changed ||= drawn.share < 1;
   at('poster').classList.add('gone');
-  loading(null);
+  // What is being received is still told.
+  if (!opener.busy) loading(null);
   stage.classList.remove('loading');
   // Windows of Bevy take the focus.
   if (!player.resize) canvas.blur();
@@ -189,7 +191,8 @@ function draw(moves) {
     player.set_share?.(gaussians);
     player.draw(time, orbit.pose(), orbit.lens(canvas.clientWidth, canvas.clientHeight));
     times.longestDraw = Math.max(times.longestDraw, performance.now() - start);
-    drawn = { start, share, gaussians, moves };
+    drawn = { start: learns ? start : 0, share, gaussians, moves };
+    learns = true;
     pictured ||= 'drawn';
   } catch (error) {
     play(false);
@@ -219,14 +222,24 @@ function report(progress) {
   tell('progress', progress);
 }
 
-// Opens a file. Returns whether it is shown; what was shown stays if it is not.
+// Opens a file. Returns whether it is shown; what was shown, perhaps its beginning, stays if it is not.
 async function open(title, begin, again, address) {
   if (!player) return fail(WITHOUT), false;
   dismiss();
+  // Whether the beginning of the file is shown.
+  let begun = false;
+  const take = (found) => (begun ? renew(found) : show(found, title, address));
   try {
-    const found = await opener.open(title, begin);
-    if (found) show(found, title, address);
-    return Boolean(found);
+    const found = await opener.open(title, begin, (beginning) => {
+      take(beginning);
+      begun = true;
+      tell('preview', { gaussians: about.gaussians });
+    });
+    if (!found) return false;
+    take(found);
+    loading(pictured === true ? null : { state: 'compiling', part: 1 });
+    tell('loaded', { seconds: duration(), gaussians: about.gaussians });
+    return true;
   } catch (error) {
     const action = error instanceof Refusal && error.again ? again : null;
     fail(message(error), { again: action ? 'Try again' : '', action, closable: Boolean(about) || !action });
@@ -248,24 +261,38 @@ function cancel() {
   else fail('Loading was cancelled.', { again: 'Load again', action: () => first() });
 }
 
+// Notes what there is to tell about the capture that is drawn from now on.
+function note(found) {
+  about = { gaussians: found.gaussians, seconds: found.seconds, interval: [...found.interval], center: found.center, radius: found.radius, up: found.up };
+  found.free?.();
+  [changed, learns] = [true, false];
+  // A picture that is on its way is of another capture.
+  if (drawn) drawn.start = 0;
+  describe();
+}
+
+// Shows a capture, or the beginning of one, from its first camera and time.
 function show(found, title, address) {
   source = address;
   name = title;
-  about = { gaussians: found.gaussians, seconds: found.seconds, interval: [...found.interval], center: found.center, radius: found.radius, up: found.up };
-  found.free?.();
+  note(found);
   orbit = new Orbit(about, !calm);
-  [seconds, changed, pictured] = [0, true, false];
+  [seconds, pictured] = [0, false];
   playing = false;
   stage.classList.remove('playing');
   stage.classList.toggle('still', !duration());
   for (const id of ['play', 'seek', 'speed', 'home', 'link']) at(id).disabled = false;
   refreshTools?.();
-  loading({ state: 'compiling', part: 1 });
-  describe();
   showTime();
   // A link with a time shows that moment.
   if (wanted && !(source === undefined && query.has('time'))) play();
-  tell('loaded', { seconds: duration(), gaussians: about.gaussians });
+  if (source === undefined) follow();
+}
+
+// Shows more of the capture that is shown: camera, time and playback stay.
+function renew(found) {
+  note(found);
+  orbit.surround(about);
 }
 
 // Shows the title and the count.
@@ -514,8 +541,10 @@ async function begin() {
 }
 
 // Opens the capture of the query, at its view.
-async function first() {
-  if (!(await openAddress(query.get('capture') ?? 'toybox.gs4d', true))) return;
+const first = () => openAddress(query.get('capture') ?? 'toybox.gs4d', true);
+
+// Goes to the camera and the time of the query.
+function follow() {
   if (query.has('camera') && !orbit.read(query.get('camera'))) say('The camera of the link is not understood');
   const time = Number(query.get('time') || 'none');
   if (Number.isFinite(time)) seek(time);

@@ -83,6 +83,8 @@ pub(crate) enum Need {
     VerifiedViews,
     /// A quality that changes values.
     Quantized,
+    /// A quality that changes the order of the Gaussians.
+    Layers,
     /// Colors that are not coded.
     WholeColors,
     /// Colors that are coded.
@@ -351,6 +353,11 @@ pub(crate) const RULES: &[Rule] = &[
             "--color-step",
         ],
         reason: "with --quality lossless, which changes no value",
+    },
+    Rule {
+        need: Need::Layers,
+        options: &["--progressive"],
+        reason: "with the quality lossless, which keeps the order of the Gaussians",
     },
     Rule { need: Need::WholeColors, options: &["--color-step"], reason: "on colors that are coded by codebooks" },
     Rule {

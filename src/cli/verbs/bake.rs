@@ -130,6 +130,9 @@ pub(crate) struct Bake {
     /// How much may be lost: small, balanced, visually-lossless or lossless.
     #[arg(long, value_name = "QUALITY", default_value = "balanced", value_parser = values::one_of(&Quality::NAMES))]
     quality: Quality,
+    /// Store the most important Gaussians first, so that a player shows a coarse picture before the whole file is there.
+    #[arg(long)]
+    progressive: bool,
     /// Do not train the Gaussians that remain after pruning. By default they are trained if there is a GPU and the
     /// images of all training views exist.
     #[arg(long)]
@@ -391,6 +394,7 @@ impl Bake {
 
     fn settings(&self, out: &Path) -> Result<BakeSettings, Failure> {
         let data = self.data()?.to_owned();
+        self.given.require(Need::Layers, self.quality != Quality::Lossless)?;
         Ok(BakeSettings {
             checkpoint: if self.is_dataset() { trained_path(out) } else { self.input.clone() },
             data,
@@ -412,6 +416,7 @@ impl Bake {
             fine_tune: (!self.no_fine_tune)
                 .then(|| FineTuneSettings { batch: self.batch, ..FineTuneSettings::default() }),
             quality: self.quality,
+            progressive: self.progressive,
             level: self.package.level,
             trust_images: self.validation.trust_images,
             keep_work: self.keep_work,

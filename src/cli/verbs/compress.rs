@@ -33,6 +33,7 @@ Examples:
   gs4d compress masked.gs4d capture.gs4d
   gs4d compress chkpnt30000.pth small.gs4d --quality small --cameras transforms_test.json
   gs4d compress chkpnt30000.pth exact.gs4d --quality visually-lossless
+  gs4d compress chkpnt30000.pth page.gs4d --progressive
   gs4d compress chkpnt30000.pth own.gs4d --codebooks 4096,4096 --scale-bits 10 --escape 0.05
 
 No choice is made on pictures, and no training views are needed: --cameras takes those of a dataset for the comparison with the original.
@@ -104,6 +105,9 @@ struct Knobs {
     /// Without codebooks: round every coefficient to a multiple of this; 0 keeps them as they are.
     #[arg(long, value_name = "STEP", value_parser = values::step)]
     color_step: Option<f32>,
+    /// Store the most important Gaussians first, so that a player shows a coarse picture before the whole file is there.
+    #[arg(long)]
+    progressive: bool,
     /// Share of the Gaussians, those with the largest splats, that keep 16 bits for mean, scale and rotation.
     #[arg(long, value_name = "SHARE", value_parser = values::share)]
     escape: Option<f64>,
@@ -127,6 +131,7 @@ impl Knobs {
             geometry,
             codebooks: self.codebooks.clone().unwrap_or(settings.codebooks),
             color_step: self.color_step.unwrap_or(settings.color_step),
+            progressive: self.progressive,
             weights: None,
         }
     }
@@ -236,6 +241,7 @@ impl Compress {
         let settings = self.knobs.settings(self.quality);
         let is_coded = !settings.codebooks.is_empty();
         self.given.require(Need::Quantized, settings.geometry.is_some())?;
+        self.given.require(Need::Layers, settings.geometry.is_some())?;
         self.given.require(Need::WholeColors, !is_coded)?;
         self.given.require(Need::Codebooks, is_coded)
     }

@@ -93,6 +93,9 @@ pub(crate) struct FineTune {
     /// sizes follow the number of Gaussians. visually-lossless and lossless have no codebooks.
     #[arg(long, value_name = "QUALITY", value_parser = values::one_of(&Quality::NAMES))]
     compress: Option<Quality>,
+    /// With --compress: store the most important Gaussians first, as `gs4d compress --progressive` does.
+    #[arg(long, requires = "compress")]
+    progressive: bool,
     /// Train codebooks on pictures of the rounded geometry of the package. Useful only if geometry has fewer bits than
     /// with `small`.
     #[arg(long, help_heading = "Experimental", requires = "compress")]
@@ -222,6 +225,7 @@ impl FineTune {
     fn check_options(&self) -> Result<(), Failure> {
         self.given.require(Need::ValidationViews, self.validation.validation != Validation::None)?;
         let is_coded = |quality: Quality| !CompressSettings::from(quality).codebooks.is_empty();
+        self.given.require(Need::Layers, self.compress != Some(Quality::Lossless))?;
         self.given.require(Need::TrainedCodebooks, self.compress.is_none_or(is_coded))
     }
 
@@ -245,6 +249,7 @@ impl FineTune {
             refresh_filter: self.refresh_filter,
             mode: self.gradients,
             rounding: self.round_geometry,
+            progressive: self.progressive,
             compress: self.compress.map(|quality| (quality, self.compress_steps)),
             ..shared
         }

@@ -151,6 +151,9 @@ impl Info {
         let name = format!("{}{version}", format.id);
         let mut pairs = vec![("file", self.file.display().to_string()), ("format", name), ("size", bytes(size))];
         pairs.extend(facts.pairs());
+        if let Some(shares) = package.and_then(shares_of_layers) {
+            pairs.push(("drawn coarsely", format!("after {shares} of the file")));
+        }
         if let Some(Extent { all, core }) = &extent {
             pairs.extend([("bounds", corners(all)), ("middle", corners(core))]);
         }
@@ -315,6 +318,13 @@ struct Sections {
     damaged: usize,
 }
 
+/// Returns the parts of a package after which a layer can be drawn; `None` if there is none before its end.
+fn shares_of_layers(info: &PackageInfo) -> Option<String> {
+    let share = |&bytes: &usize| format!("{:.0} %", 100.0 * bytes as f64 / info.file_length.max(1) as f64);
+    let shares: Vec<String> = info.layers.iter().map(share).collect();
+    (!shares.is_empty()).then(|| shares.join(", "))
+}
+
 /// Returns a table with one row for all sections of the same name, in the order of the file.
 fn section_table(info: &PackageInfo) -> Table {
     let mut rows: Vec<(&str, Sections)> = Vec::new();
@@ -350,6 +360,7 @@ fn package_json(info: &PackageInfo) -> Value {
         "generator": info.header.generator,
         "intact": info.is_intact(),
         "damaged": info.damaged,
+        "layers": info.layers,
         "sections": info.header.sections,
     })
 }

@@ -1,7 +1,9 @@
 //! Attributes: the columns of a scene that sections hold.
 //!
-//! In: the place of a column in a table of words. Out: its [`Attribute`], with its sizes and its runs of rows.
+//! In: the place of a column in a table of words. Out: its [`Attribute`], with its sizes, its runs of rows, and its
+//! rows of the first Gaussians.
 
+use crate::scene::PackedScene;
 use std::ops::Range;
 
 /// One attribute of all Gaussians, or of another part of a scene: a column of a table of words.
@@ -30,8 +32,17 @@ impl Attribute {
         (rows as u64).saturating_mul(self.width as u64 * 4)
     }
 
-    /// Returns its rows in runs of at most `length`.
-    pub(super) fn runs(self, length: usize) -> impl Iterator<Item = (Self, Range<usize>)> {
-        (0..self.rows).step_by(length).map(move |first| (self, first..self.rows.min(first.saturating_add(length))))
+    /// Returns some of its rows in runs of at most `length`.
+    pub(super) fn runs(self, rows: Range<usize>, length: usize) -> impl Iterator<Item = (Self, Range<usize>)> {
+        rows.clone().step_by(length).map(move |first| (self, first..rows.end.min(first.saturating_add(length))))
+    }
+
+    /// Returns the number of its rows that the first `gaussians` Gaussians have, if a picture in plain color needs it.
+    pub(super) fn rows_of(&self, gaussians: usize) -> Option<usize> {
+        match self.name {
+            "packed_mean" | "packed_motion" | "packed_shape" | "color_base" | "sh_dc" => Some(gaussians),
+            "packed_ranges" => Some(PackedScene::range_count(gaussians)),
+            _ => None,
+        }
     }
 }

@@ -11,7 +11,7 @@ use super::section::{FLOAT_PLANES, PACKAGE, Section};
 use crate::gaussian::SMALLEST_CUTOFF;
 use crate::gaussian::harmonics::{MAX_COEFFICIENTS, evaluated};
 use crate::scene::detail::check_sizes;
-use crate::scene::packed::MAX_ENTRIES;
+use crate::scene::packed::{MAX_ENTRIES, are_layers};
 use crate::scene::{GaussianScene, MAX_LEVELS, MAX_SEGMENTS, SceneForm, Trained, check_sockets};
 
 /// Uncompressed bytes that a package of any length may hold.
@@ -133,6 +133,11 @@ impl Header {
         sane(
             self.filter.is_none_or(|filter| (1..=MAX_SEGMENTS).contains(&filter.segments)),
             "a temporal filter of no segments, or far too many",
+        )?;
+        let is_packed = matches!(self.form, StoredForm::Packed { .. });
+        sane(
+            self.layers.is_empty() || (is_packed && are_layers(&self.layers, self.gaussians)),
+            "layers that are not ascending numbers of whole blocks of packed Gaussians",
         )?;
         sane(self.levels.len() <= MAX_LEVELS, "more levels of detail than a capture may have")?;
         check_sizes(self.levels.iter().map(|level| level.pixels)).map_err(PackageError::Inconsistent)?;

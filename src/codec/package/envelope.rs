@@ -39,6 +39,32 @@ pub(super) fn write(writer: &mut impl Write, header: &Header) -> Result<u64, Pac
 pub(super) fn read(reader: &mut (impl Read + Seek)) -> Result<(Header, u64), PackageError> {
     let file_length = reader.seek(SeekFrom::End(0))?;
     reader.rewind()?;
+    let (header, start) = read_header(reader, file_length)?;
+    header.check(start, file_length)?;
+    Ok((header, file_length))
+}
+
+/// Reads and checks the fixed start and the header of a package whose beginning has been received. Also returns where
+/// the first section starts. `None`: there are not enough bytes.
+pub(super) fn read_beginning(bytes: &[u8]) -> Result<Option<(Header, u64)>, PackageError> {
+    let known = MAGIC.len().min(bytes.len());
+    if bytes[..known] != MAGIC[..known] {
+        return Err(PackageError::NotAPackage);
+    }
+    let length = bytes.get(8..16).and_then(|length| length.try_into().ok()).map(u64::from_le_bytes);
+    let Some(length) = length else { return Ok(None) };
+    check_length(length)?;
+    if (bytes.len() as u64) < FIXED + length {
+        return Ok(None);
+    }
+    let (header, start) = read_header(&mut &*bytes, bytes.len() as u64)?;
+    header.check(start, header.end(start))?;
+    Ok(Some((header, start)))
+}
+
+/// Reads the fixed start and the header, of a file of which `file_length` bytes can be read. Also returns where the
+/// first section starts.
+fn read_header(reader: &mut impl Read, file_length: u64) -> Result<(Header, u64), PackageError> {
     if file_length < MAGIC.len() as u64 || bytes::<4>(reader)? != MAGIC {
         return Err(PackageError::NotAPackage);
     }
@@ -56,9 +82,7 @@ pub(super) fn read(reader: &mut (impl Read + Seek)) -> Result<(Header, u64), Pac
     if checksum(&text) != stored {
         return Err(PackageError::HeaderChecksum);
     }
-    let header = Header::parse(&text)?;
-    header.check(FIXED + length, file_length)?;
-    Ok((header, file_length))
+    Ok((Header::parse(&text)?, FIXED + length))
 }
 
 /// Returns the CRC-32 of everything before the first section except the checksum itself.

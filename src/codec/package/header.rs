@@ -45,6 +45,9 @@ pub struct Header {
     pub trained_with: TrainedWith,
     /// How the capture is meant to be played.
     pub playback: PlaybackHints,
+    /// Numbers of Gaussians up to the ends of the layers but the last ([`PackedScene::layers`]). Empty: one layer.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub layers: Vec<usize>,
     /// The levels of detail, finest first. Each is a section `level` of its own.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub levels: Vec<StoredLevel>,
@@ -172,6 +175,10 @@ impl Header {
             }),
             trained_with: scene.trained_with.clone(),
             playback: scene.playback,
+            layers: match &scene.form {
+                SceneForm::Ready(Form::Packed(packed)) => packed.layers.clone(),
+                SceneForm::Trained(_) | SceneForm::Ready(Form::Sliced(_)) => Vec::new(),
+            },
             levels: scene.levels.iter().map(|level| StoredLevel { pixels: level.pixels }).collect(),
             sockets: scene.sockets.clone(),
             colliders: scene.colliders.as_deref().map(StoredColliders::of),

@@ -27,6 +27,7 @@ pub(super) fn empty(header: &Header) -> GaussianScene {
         StoredForm::Packed { codebooks } => SceneForm::Ready(Form::Packed(PackedScene {
             records: Vec::new(),
             ranges: Vec::new(),
+            layers: header.layers.clone(),
             colors: match codebooks {
                 None => PackedColors::Whole(harmonics),
                 Some(entries) => PackedColors::Coded(CodedColors {

@@ -5,11 +5,13 @@
 //!
 //! A package is a fixed start ([`MAGIC`], [`VERSION`], length and checksum of the header), a [`Header`] in RON, and the
 //! sections that the header lists. A section holds one attribute of a run of Gaussians, split into byte planes
-//! (`planes`), compressed and checksummed on its own. The order is geometry, first color coefficients, the other
-//! coefficients, temporal filter, environment map, colliders, levels of detail, each of which is a package itself. A
-//! reader skips unknown sections, and refuses a package whose header requires an unknown feature.
+//! (`planes`), compressed and checksummed on its own. The order is geometry and first color coefficients, layer by layer
+//! so that a [`Beginning`] of the file can be drawn, the other coefficients, temporal filter, environment map,
+//! colliders, levels of detail, each of which is a package itself. A reader skips unknown sections, and refuses a
+//! package whose header requires an unknown feature.
 
 mod attribute;
+mod beginning;
 mod check;
 mod colliders;
 mod envelope;
@@ -22,6 +24,7 @@ mod planes;
 mod reading;
 pub(crate) mod section;
 
+pub use beginning::Beginning;
 pub use colliders::{StoredColliders, StoredMesh, StoredStretch};
 pub use envelope::{MAGIC, VERSION};
 pub use error::PackageError;
@@ -73,6 +76,8 @@ pub struct PackageInfo {
     pub file_length: u64,
     /// The header; its checksum is correct.
     pub header: Header,
+    /// Bytes of the package after which each layer can be drawn coarsely ([`Beginning::layers`]).
+    pub layers: Vec<usize>,
     /// Indices in `header.sections` of the sections with a wrong checksum or length.
     pub damaged: Vec<usize>,
 }
@@ -99,7 +104,15 @@ pub fn write<W: Write>(mut writer: W, scene: &GaussianScene, settings: &WriteSet
     let rows = |attribute: &Attribute| {
         if is_packed && attribute.width <= PACKED_WORDS { PACKED_ROWS_PER_SECTION } else { ROWS_PER_SECTION }
     };
-    let runs: Vec<_> = header.attributes().into_iter().flat_map(|a| a.runs(rows(&a))).collect();
+    let (attributes, mut runs, mut before) = (header.attributes(), Vec::new(), 0);
+    let written =
+        |attribute: &Attribute, gaussians| attribute.rows_of(gaussians).filter(|_| gaussians > 0).unwrap_or(0);
+    for &end in &header.layers {
+        let layer = |a: &Attribute| a.runs(written(a, before)..written(a, end), rows(a));
+        runs.extend(attributes.iter().flat_map(layer));
+        before = end;
+    }
+    runs.extend(attributes.iter().flat_map(|a| a.runs(written(a, before)..a.rows, rows(a))));
     let encoded = runs
         .into_par_iter()
         .map(|(attribute, rows)| {
@@ -163,5 +176,6 @@ pub fn inspect<R: Read + Seek>(reader: R) -> Result<PackageInfo, PackageError> {
             Err(other) => return Err(other),
         }
     }
-    Ok(PackageInfo { version: VERSION, file_length, header, damaged })
+    let layers = Beginning::of_header(&header, file_length - header.end(0)).layers().to_vec();
+    Ok(PackageInfo { version: VERSION, file_length, header, layers, damaged })
 }

@@ -41,7 +41,8 @@ pub(super) fn compress(
 ) -> Result<Vec<u8>, BakeError> {
     let settings = inputs.settings;
     let key = if inputs.tunes().is_some() { key.with(inputs.images_key()) } else { key };
-    let key = key.and(&format!("{:?} {:?} {:?}", settings.quality, settings.level, inputs.tunes()));
+    let key =
+        key.and(&format!("{:?} {:?} {:?} {}", settings.quality, settings.level, inputs.tunes(), settings.progressive));
     let (Package(bytes), _) = stages.run(
         "compress",
         key,
@@ -54,7 +55,8 @@ pub(super) fn compress(
                 SceneForm::Trained(_) | SceneForm::Ready(Form::Sliced(_)) => {
                     let runtime = scene.into_runtime();
                     let runtime = runtime.map_err(|error| FileError::at(&settings.checkpoint, error))?;
-                    pack(runtime, &CompressSettings::from(settings.quality))?.0
+                    let progressive = settings.progressive;
+                    pack(runtime, &CompressSettings { progressive, ..CompressSettings::from(settings.quality) })?.0
                 }
             };
             let mut bytes = Vec::new();

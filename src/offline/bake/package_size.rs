@@ -25,6 +25,8 @@ pub(crate) struct Packages<'a> {
     /// Number of key-frames of the temporal filter.
     pub key_frames: u32,
     pub quality: Quality,
+    /// Whether the Gaussians are in layers.
+    pub progressive: bool,
     /// zstd level; `None`: that of [`write_settings`].
     pub level: Option<i32>,
     /// Whether the Gaussians are trained: the sizes of codebooks then follow their number.
@@ -42,6 +44,7 @@ impl Packages<'_> {
             true => CompressSettings::suiting(self.quality, kept.len()),
             false => CompressSettings::from(self.quality),
         };
+        let options = CompressSettings { progressive: self.progressive, ..options };
         let (compressed, _) = compress(scene.into_runtime()?, &options)?;
         let mut bytes = Vec::new();
         package::write(&mut bytes, &compressed, &write_settings(&compressed.form, self.level))?;

@@ -47,6 +47,8 @@ pub struct BakeSettings {
     pub fine_tune: Option<FineTuneSettings>,
     /// The quality of the compressed capture.
     pub quality: Quality,
+    /// Whether the Gaussians of the package are in layers, the most important ones first.
+    pub progressive: bool,
     /// zstd level of the package, 1 (fast) to 19 (small); `None` uses the default of `write_settings`.
     pub level: Option<i32>,
     /// Whether images are used without a check that they show the capture.

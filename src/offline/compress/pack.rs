@@ -3,7 +3,7 @@
 //! In: a scene ready to draw, [`CompressSettings`], codebooks if they have been trained before. Out: the packed scene,
 //! and a [`CompressReport`].
 //!
-//! The Gaussians are sorted in Morton order and encoded as records (`scene::packed`); their colors are rounded, or
+//! The Gaussians are sorted in Morton order, perhaps in layers, and encoded as records (`scene::packed`); their colors are rounded, or
 //! coded by codebooks.
 
 use super::codebook::Centers;
@@ -11,7 +11,7 @@ use super::coded_colors::coded_colors;
 use super::{CompressError, CompressSettings};
 use crate::scene::packed::MAX_STAGES;
 use crate::scene::packed::anchor::move_near;
-use crate::scene::packed::order::{is_filler, morton_order};
+use crate::scene::packed::order::{Order, is_filler};
 use crate::scene::packed::pack::pack_ordered;
 use crate::scene::{Form, GaussianScene, PackedColors, Packing, RuntimeScene, SceneForm, TrainedWith};
 use ndarray::Array2;
@@ -88,7 +88,7 @@ pub(crate) fn compress_tied(
 ) -> Result<(GaussianScene, CompressReport), CompressError> {
     let scene = anchored(scene, settings);
     let Form::Sliced(sliced) = &scene.form else { return Err(CompressError::AlreadyPacked) };
-    let order = morton_order(&sliced.gaussians);
+    let order = Order::of(&sliced.gaussians, settings.progressive).indices;
     let codes = books.codes.iter().map(|codes| order.iter().map(|&index| codes[index as usize]).collect());
     let ordered = Centers { entries: books.entries.clone(), codes: codes.collect() };
     compress_by(scene, settings, |_, _, _| ordered)
@@ -126,16 +126,18 @@ fn compress_by(
         return Ok((scene.into(), report));
     };
     if books.is_empty() {
-        let packed = scene.pack(&Packing { bits: *bits, color_step: settings.color_step })?;
+        let packed =
+            scene.pack(&Packing { bits: *bits, color_step: settings.color_step, progressive: settings.progressive })?;
         (report.memory_after, report.fillers) = (packed.size(), packed.len() - report.gaussians);
         return Ok((packed.into(), report));
     }
-    let order = morton_order(&sliced.gaussians);
+    let order = Order::of(&sliced.gaussians, settings.progressive);
+    let places = &order.indices;
     let weight =
         |index: usize| settings.weights.as_ref().map_or(sliced.gaussians[index].opacity, |weights| weights[index]);
-    let weight_at = |place: usize| if is_filler(&order, place) { 0.0 } else { weight(order[place] as usize) };
-    let weights: Vec<f32> = (0..order.len()).map(weight_at).collect();
-    let (coded, base) = coded_colors(&sliced.harmonics, &order, bits, |rest| train(rest, &weights, books));
+    let weight_at = |place: usize| if is_filler(places, place) { 0.0 } else { weight(places[place] as usize) };
+    let weights: Vec<f32> = (0..places.len()).map(weight_at).collect();
+    let (coded, base) = coded_colors(&sliced.harmonics, places, bits, |rest| train(rest, &weights, books));
     report.codebooks.clone_from(&coded.entries);
     let packed = pack_ordered(scene, bits, &order, PackedColors::Coded(coded), base)?;
     (report.memory_after, report.fillers) = (packed.size(), packed.len() - report.gaussians);

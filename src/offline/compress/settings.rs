@@ -45,6 +45,8 @@ pub struct CompressSettings {
     /// Without codebooks, coefficients are rounded to multiples of this, so that they compress; 0 keeps them as they
     /// are. A step above 0 must be a normal number: multiples of a subnormal one are not accurate.
     pub color_step: f32,
+    /// Whether quantized Gaussians are in layers, the most important ones first ([`Packing::progressive`]).
+    pub progressive: bool,
     /// Weight of each Gaussian's color, not negative, in the order of the scene; `None` weighs by opacity.
     #[serde(skip)]
     pub weights: Option<Vec<f32>>,
@@ -96,7 +98,7 @@ impl From<Quality> for CompressSettings {
             Quality::Lossless => (None, Vec::new()),
         };
         let color_step = if quality == Quality::VisuallyLossless { Packing::default().color_step } else { 0.0 };
-        Self { geometry, codebooks, color_step, weights: None }
+        Self { geometry, codebooks, color_step, progressive: false, weights: None }
     }
 }
 

@@ -46,6 +46,8 @@ pub struct FineTuneSettings {
     /// How the result is compressed, and the number of further steps in which the codebooks of color are trained;
     /// `None` leaves the scene in the trained form.
     pub compress: Option<(Quality, usize)>,
+    /// Whether the Gaussians of the compressed result are in layers, the most important ones first. Default: `false`.
+    pub progressive: bool,
     /// Whether these further steps see geometry as the package will hold it, rounded. Default: `false`; it pays with
     /// few bits.
     pub rounding: bool,
@@ -90,6 +92,7 @@ impl Default for FineTuneSettings {
             mode: GradientMode::default(),
             growth: None,
             compress: None,
+            progressive: false,
             rounding: false,
             standing: false,
         }

@@ -311,6 +311,7 @@ mod tests {
             records: vec![[0; RECORD_WORDS]],
             ranges: Vec::new(),
             colors: PackedColors::Whole(Harmonics { coefficients: 1, values: vec![0.0; 3], ..Harmonics::default() }),
+            layers: Vec::new(),
         };
         let empty = RuntimeScene::sliced(Vec::new(), Harmonics::default());
         let scene = RuntimeScene { form: Form::Packed(packed), ..empty };

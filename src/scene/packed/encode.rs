@@ -76,7 +76,7 @@ impl Default for Bits {
 }
 
 impl PackedScene {
-    /// Packs Gaussians, keeping their order. `base` is the range (low, high) of coded DC coefficients, as
+    /// Packs Gaussians, keeping their order, as one layer. `base` is the range (low, high) of coded DC coefficients, as
     /// [`CodedColors::of_base`](super::CodedColors::of_base) returns it; `reach` is the longest time over which motion
     /// matters, the length of the time interval in timestamp units.
     pub fn encode(gaussians: &[Gaussian], bits: &Bits, colors: PackedColors, base: [f32; 2], reach: f32) -> Self {
@@ -158,7 +158,7 @@ impl PackedScene {
             ranges.extend(block_ranges);
             records.extend(own);
         }
-        Self { records, ranges, colors }
+        Self { records, ranges, colors, layers: Vec::new() }
     }
 }
 

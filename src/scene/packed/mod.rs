@@ -9,7 +9,7 @@
 //! | `lanes.rs` | the position and the range of each value in a record, for the encoder and the decoder |
 //! | `pack.rs` | from a scene to its packed form |
 //! | `anchor.rs` | moves temporal means close to the time interval |
-//! | `order.rs`, `morton.rs` | the order of the Gaussians: neighbors share a box |
+//! | `order.rs`, `morton.rs` | the order of the Gaussians: neighbors share a box, layers follow each other |
 //! | `strays.rs` | Gaussians far from the others, which have blocks of their own |
 //! | `encode.rs`, `additional_bits.rs` | from Gaussians to records and ranges |
 //! | `decode.rs` | from records and ranges to Gaussians and colors |
@@ -40,4 +40,5 @@ pub use encode::Bits;
 pub use lanes::{BLOCK, BLOCK_RANGES, COLOR_WORDS, MAX_ENTRIES, MAX_STAGES, RECORD_WORDS, SHARED_RANGES};
 pub use pack::{PackError, Packing};
 pub use rounding::Rounding;
+pub(crate) use scene::are_layers;
 pub use scene::{PackedColors, PackedScene};

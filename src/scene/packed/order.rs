@@ -1,13 +1,62 @@
 //! The order in which packed Gaussians are stored: neighbors in space follow each other.
 //!
-//! In: means. Out: a permutation by Morton code (Z-order), so that blocks have small boxes and columns compress. If
-//! some Gaussians are so far away that the others would lose precision, the order also has fillers ([`is_filler`]), so
-//! that distant Gaussians are in blocks of their own.
+//! In: Gaussians. Out: a permutation by the Morton code (Z-order) of their means, so that blocks have small boxes and
+//! columns compress; a progressive order has layers, the most important Gaussians first, each in Morton order. If some
+//! Gaussians are so far away that the others would lose precision, the order also has fillers ([`is_filler`]), so that
+//! distant Gaussians are in blocks of their own. Fillers also end a layer, which has whole blocks.
 
+use super::lanes::BLOCK;
 use super::morton::by_code;
 pub use super::morton::is_filler;
-use super::strays::set_apart;
+use super::strays::{append, set_apart};
 use crate::gaussian::Gaussian;
+use rayon::prelude::*;
+
+/// Each layer of a progressive order but the last ends at the total number of blocks divided by one of these: a quarter
+/// of the Gaussians, then a half.
+const LAYERS: [usize; 2] = [4, 2];
+
+/// The order of the Gaussians of a packed scene.
+pub struct Order {
+    /// The index of the Gaussian at each place.
+    pub indices: Vec<u32>,
+    /// The places at which the layers but the last end, ascending: multiples of [`BLOCK`].
+    pub layers: Vec<usize>,
+}
+
+impl Order {
+    /// Returns the Morton order, or the progressive one.
+    pub fn of(gaussians: &[Gaussian], progressive: bool) -> Self {
+        if progressive {
+            progressive_order(gaussians)
+        } else {
+            Self { indices: morton_order(gaussians), layers: Vec::new() }
+        }
+    }
+}
+
+/// Returns the Gaussians in layers of descending [importance](Gaussian::importance), each in Morton order.
+fn progressive_order(gaussians: &[Gaussian]) -> Order {
+    let importances: Vec<f32> = gaussians.par_iter().map(Gaussian::importance).collect();
+    let key = |index: &u32| importances[*index as usize];
+    let mut sorted: Vec<u32> = (0..gaussians.len() as u32).collect();
+    sorted.sort_unstable_by(|a, b| key(b).total_cmp(&key(a)).then(a.cmp(b)));
+    let blocks = sorted.len().div_ceil(BLOCK);
+    let ends = LAYERS.map(|divisor| blocks.div_ceil(divisor) * BLOCK);
+    let (mut order, mut start) = (Order { indices: Vec::new(), layers: Vec::new() }, 0);
+    for end in ends.into_iter().chain([sorted.len()]) {
+        let layer = sorted.get(start..end.min(sorted.len())).unwrap_or_default();
+        if layer.is_empty() {
+            continue;
+        }
+        if start > 0 {
+            order.layers.push(order.indices.len().next_multiple_of(BLOCK));
+        }
+        append(&mut order.indices, &set_apart(gaussians, by_code(gaussians, layer.to_vec())));
+        start += layer.len();
+    }
+    order
+}
 
 /// Returns the indices of the Gaussians in Morton order of their means; equal codes keep their order. If blocks would
 /// lose precision, Gaussians far from the others are last, and groups far apart begin a block each.
@@ -19,6 +68,55 @@ pub fn morton_order(gaussians: &[Gaussian]) -> Vec<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::random::Random;
+
+    fn gaussian(random: &mut Random) -> Gaussian {
+        let mut within = |low: f32, high: f32| random.in_range(low, high);
+        let variance = within(1e-4, 1e-2);
+        Gaussian {
+            mean: [0; 3].map(|_| within(-1.0, 1.0)),
+            covariance: [variance, 0.0, 0.0, variance, 0.0, variance],
+            opacity: within(0.1, 1.0),
+            ..bytemuck::Zeroable::zeroed()
+        }
+    }
+
+    #[test]
+    fn layers_have_whole_blocks_and_descending_importance() {
+        for (count, layers) in [(0, vec![]), (256, vec![]), (300, vec![256]), (10_000, vec![2_560, 5_120])] {
+            let mut random = Random::new(1);
+            let gaussians: Vec<Gaussian> = (0..count).map(|_| gaussian(&mut random)).collect();
+            let order = Order::of(&gaussians, true);
+            assert_eq!(order.layers, layers, "{count} Gaussians");
+            let mut sorted = order.indices.clone();
+            sorted.sort_unstable();
+            assert!(sorted.into_iter().eq(0..count), "each of {count} indices occurs once");
+            let importance = |index: &u32| gaussians[*index as usize].importance();
+            for &end in &order.layers {
+                let (before, after) = order.indices.split_at(end);
+                let least = before.iter().map(importance).fold(f32::INFINITY, f32::min);
+                let most = after.iter().map(importance).fold(0.0, f32::max);
+                assert!(least >= most, "{least} before the end of a layer, {most} after it");
+            }
+        }
+    }
+
+    #[test]
+    fn layers_with_strays_end_with_fillers() {
+        let mut random = Random::new(2);
+        let mut gaussians: Vec<Gaussian> = (0..4_000).map(|_| gaussian(&mut random)).collect();
+        for stray in gaussians.iter_mut().step_by(100) {
+            stray.mean = stray.mean.map(|axis| axis * 1e5);
+        }
+        let order = Order::of(&gaussians, true);
+        assert!(order.indices.len() > 4_000, "strays have blocks of their own");
+        assert_eq!(order.layers.len(), 2, "three layers");
+        assert!(order.layers.iter().all(|end| end.is_multiple_of(BLOCK)), "whole blocks: {:?}", order.layers);
+        let own = (0..order.indices.len()).filter(|&place| !is_filler(&order.indices, place));
+        let mut own: Vec<u32> = own.map(|place| order.indices[place]).collect();
+        own.sort_unstable();
+        assert!(own.into_iter().eq(0..4_000), "each index occurs once, besides fillers");
+    }
 
     #[test]
     fn the_order_is_a_permutation_in_which_neighbors_are_close() {

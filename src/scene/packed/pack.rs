@@ -6,7 +6,7 @@
 
 use super::anchor::move_near;
 use super::encode::Bits;
-use super::order::{is_filler, morton_order};
+use super::order::{Order, is_filler};
 use super::scene::{PackedColors, PackedScene};
 use crate::gaussian::{Gaussian, Harmonics};
 use crate::scene::filter::{FilterKind, TemporalFilter};
@@ -25,11 +25,14 @@ pub struct Packing {
     /// Color coefficients are rounded to multiples of this, so that they compress; 0 keeps them as they are. A step
     /// above 0 must be a normal number: multiples of a subnormal one are not accurate. Default: 1/256.
     pub color_step: f32,
+    /// Whether the Gaussians are in layers, the most important ones first, so that a program that receives a package
+    /// can draw it coarsely before all of it is there. Default: no.
+    pub progressive: bool,
 }
 
 impl Default for Packing {
     fn default() -> Self {
-        Self { bits: Bits::default(), color_step: 1.0 / 256.0 }
+        Self { bits: Bits::default(), color_step: 1.0 / 256.0, progressive: false }
     }
 }
 
@@ -80,8 +83,8 @@ impl RuntimeScene {
         let TrainedWith { time_interval, marginal_cutoff, .. } = self.trained_with;
         let Form::Sliced(sliced) = &mut self.form else { return Err(PackError::AlreadyPacked) };
         move_near(&mut sliced.gaussians, time_interval, marginal_cutoff);
-        let order = morton_order(&sliced.gaussians);
-        let colors = PackedColors::Whole(rounded(sliced.harmonics.select(&order), packing.color_step));
+        let order = Order::of(&sliced.gaussians, packing.progressive);
+        let colors = PackedColors::Whole(rounded(sliced.harmonics.select(&order.indices), packing.color_step));
         pack_ordered(self, &packing.bits, &order, colors, [0.0; 2])
     }
 }
@@ -94,13 +97,15 @@ impl RuntimeScene {
 pub(crate) fn pack_ordered(
     scene: RuntimeScene,
     bits: &Bits,
-    order: &[u32],
+    order: &Order,
     colors: PackedColors,
     base: [f32; 2],
 ) -> Result<RuntimeScene, PackError> {
     let Form::Sliced(sliced) = &scene.form else { return Err(PackError::AlreadyPacked) };
     let TrainedWith { time_interval, marginal_cutoff, .. } = scene.trained_with;
-    let packed = encode_ordered(&sliced.gaussians, order, bits, colors, base, scene.trained_with.time_span());
+    let Order { indices: order, layers } = order;
+    let encoded = encode_ordered(&sliced.gaussians, order, bits, colors, base, scene.trained_with.time_span());
+    let packed = PackedScene { layers: layers.clone(), ..encoded };
     packed.check().map_err(PackError::Range)?;
     check_each(&packed, order)?;
     let filter = scene.filter.map(|filter| match filter.kind {
@@ -165,7 +170,7 @@ mod tests {
     #[test]
     fn packed_gaussians_are_close_to_those_of_the_scene() {
         let scene = sliced();
-        let order = morton_order(&scene.iter().collect::<Vec<_>>());
+        let order = Order::of(&scene.iter().collect::<Vec<_>>(), false).indices;
         let packed = scene.clone().pack(&Packing::default()).expect("the scene fits");
         let size = |scene: &RuntimeScene| scene.form.size();
         assert!(matches!(packed.form, Form::Packed(_)) && size(&packed) < size(&scene), "packed and smaller");

@@ -18,6 +18,10 @@ pub struct PackedScene {
     pub ranges: Vec<[f32; 4]>,
     /// Their color.
     pub colors: PackedColors,
+    /// Numbers of Gaussians up to the ends of the layers but the last, ascending multiples of [`BLOCK`]: the Gaussians
+    /// of a layer are less important than those before it, so that the first layers show the scene coarsely. Empty:
+    /// one layer.
+    pub layers: Vec<usize>,
 }
 
 /// The color of packed Gaussians.
@@ -63,6 +67,9 @@ impl PackedScene {
         if self.ranges.len() != Self::range_count(self.len()) {
             return Err("the ranges do not fit the number of Gaussians");
         }
+        if !are_layers(&self.layers, self.len()) {
+            return Err("layers that are not ascending numbers of whole blocks");
+        }
         if !self.ranges.as_flattened().iter().all(|value| value.is_finite()) {
             return Err("a range that is not finite");
         }
@@ -75,4 +82,10 @@ impl PackedScene {
             PackedColors::Coded(colors) => colors.check(self.len()),
         }
     }
+}
+
+/// Returns whether these are numbers of Gaussians, of `count`, at which layers but the last can end.
+pub(crate) fn are_layers(layers: &[usize], count: usize) -> bool {
+    let ascending = layers.is_sorted_by(|a, b| a < b) && layers.last().is_none_or(|&last| last < count);
+    ascending && layers.iter().all(|&end| end > 0 && end.is_multiple_of(BLOCK))
 }

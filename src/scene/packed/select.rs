@@ -35,7 +35,17 @@ impl PackedScene {
             PackedColors::Whole(harmonics) => PackedColors::Whole(harmonics.select(&order)),
             PackedColors::Coded(colors) => PackedColors::Coded(colors.select(&order)),
         };
-        (Self { records, ranges, colors }, order)
+        let layers = self.layers_of(&order);
+        (Self { records, ranges, colors, layers }, order)
+    }
+
+    /// Returns the ends of the layers of an order of some of the Gaussians, whose blocks are those of the scene.
+    fn layers_of(&self, order: &[u32]) -> Vec<usize> {
+        let end = |&end: &usize| order.partition_point(|&index| (index as usize) < end).next_multiple_of(BLOCK);
+        let mut layers: Vec<usize> = self.layers.iter().map(end).collect();
+        layers.dedup();
+        layers.retain(|&end| end > 0 && end < order.len());
+        layers
     }
 }
 
@@ -93,6 +103,18 @@ mod tests {
         }
         assert_eq!(own, keep, "every kept Gaussian once, in its order");
         assert!(fillers > 0 && order.len() < all.len(), "{fillers} fillers; the empty block is left out");
+    }
+
+    #[test]
+    fn layers_keep_the_gaussians_that_are_left() {
+        let mut all = packed(1500);
+        all.layers = vec![256, 768];
+        let layers = |keep: &[u32]| all.select(keep).0.layers;
+        assert_eq!(layers(&(0..1500).collect::<Vec<_>>()), [256, 768], "all Gaussians");
+        assert_eq!(layers(&[3, 4, 300, 800]), [256, 512], "two blocks in the first two layers");
+        assert_eq!(layers(&[300, 800]), [256], "none in the first layer");
+        assert_eq!(layers(&[3, 5]), [0; 0], "none behind the first layer");
+        assert_eq!(layers(&[900]), [0; 0], "the last layer alone");
     }
 
     #[test]

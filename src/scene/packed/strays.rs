@@ -175,7 +175,7 @@ fn arranged(gaussians: &[Gaussian], near: &[u32], strays: Vec<u32>) -> Vec<u32> 
 }
 
 /// Appends Gaussians from the beginning of a block on: the block before is filled with copies of its last Gaussian.
-fn append(order: &mut Vec<u32>, group: &[u32]) {
+pub(super) fn append(order: &mut Vec<u32>, group: &[u32]) {
     if let Some(&last) = order.last() {
         order.resize(order.len().next_multiple_of(BLOCK), last);
     }

@@ -9,12 +9,12 @@ use crate::change::{bytes, gaussians, numbers, text};
 use crate::support::packed_scene;
 use crate::support::random::Random;
 use bevy_gs4d::codec::package::{
-    self, EnvironmentSize, Header, MAGIC, Section, StoredColliders, StoredFilter, StoredForm, StoredMesh, VERSION,
-    WriteSettings,
+    self, Beginning, EnvironmentSize, Header, MAGIC, Section, StoredColliders, StoredFilter, StoredForm, StoredMesh,
+    VERSION, WriteSettings,
 };
 use bevy_gs4d::gaussian::{Model, Parameters};
 use bevy_gs4d::internal::codec::{FLOAT_PLANES, PACKAGE};
-use bevy_gs4d::offline::compress::compress;
+use bevy_gs4d::offline::compress::{CompressSettings, compress};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{
     ColliderMesh, ColliderStretch, Colliders, Environment, FilterKind, GaussianScene, Level, RuntimeScene, SceneForm,
@@ -63,13 +63,29 @@ impl Reader for Packages {
     }
 
     fn read(&self, bytes: &[u8]) -> Result<Outcome, String> {
+        let layers = layers(bytes)?;
         let intact = package::inspect(Cursor::new(bytes)).is_ok_and(|info| info.is_intact());
         match package::read(Cursor::new(bytes)) {
             Ok(_) if !intact => Err("is read, although inspecting it finds damage".to_owned()),
+            Ok(_) if layers.iter().any(|layer| !layer) => Err("is read, although a layer of it is refused".to_owned()),
             Ok(scene) => accepted::check(scene, DrawnBy::CpuAndGpu),
             Err(error) => Ok(Outcome::Refused(error.to_string())),
         }
     }
+}
+
+/// Returns whether each layer of the beginning of a file is read.
+///
+/// # Errors
+/// A layer that cannot be taken from the bytes up to its end.
+fn layers(bytes: &[u8]) -> Result<Vec<bool>, String> {
+    let Ok(Some(beginning)) = Beginning::of(bytes) else { return Ok(Vec::new()) };
+    let ends = beginning.layers().iter().enumerate().filter(|(_, end)| **end <= bytes.len());
+    let is_read = |(layer, &end): (usize, &usize)| {
+        let part = beginning.package(&bytes[..end], layer).map_err(|error| format!("layer {layer}: {error}"))?;
+        Ok(package::read(Cursor::new(part)).is_ok())
+    };
+    ends.map(is_read).collect()
 }
 
 /// Returns a small scene of every form, with and without each optional part.
@@ -98,6 +114,8 @@ fn scenes() -> Vec<GaussianScene> {
         let scene = packed_scene::scene(40, degree, degree_t);
         compress(scene, &packed_scene::settings(codebooks)).expect("a synthetic scene can be compressed").0
     };
+    let settings = CompressSettings { progressive: true, ..packed_scene::settings(&[3]) };
+    let layered = compress(packed_scene::scene(700, 1, 0), &settings).expect("a synthetic scene can be compressed").0;
     let mut detailed = packed_scene::scene(40, 0, 0);
     detailed.levels = [(64.0, 9), (8.0, 3)]
         .map(|(pixels, count)| {
@@ -117,6 +135,7 @@ fn scenes() -> Vec<GaussianScene> {
         pack(3, 0, &[4, 4]),
         pack(1, 0, &[3]),
         pack(0, 0, &[]),
+        layered,
         synthesize(&SynthSettings { count: 0, ..SynthSettings::default() }),
     ]
 }
@@ -322,7 +341,8 @@ fn change_number(header: &mut Header, random: &mut Random) {
     const COEFFICIENTS: [usize; 14] = [0, 1, 2, 4, 5, 9, 10, 15, 16, 17, 32, 33, 48, 49];
     let any = random.one_in(5).then(|| numbers::whole(random));
     let small = |random: &mut Random| any.map_or(random.below(5) as u32, |any| any as u32);
-    match random.below(10) {
+    match random.below(11) {
+        10 => header.layers = (0..random.below(4)).map(|_| *random.pick(&[0, 256, 512, 100, usize::MAX])).collect(),
         9 => change_colliders(&mut header.colliders, random),
         8 => {
             let at = random.below(header.levels.len());

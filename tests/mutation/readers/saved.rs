@@ -68,6 +68,7 @@ impl Saved {
             key_frames: KeyFrames::Count(4),
             fine_tune: None,
             quality: Quality::VisuallyLossless,
+            progressive: false,
             level: Some(1),
             trust_images: false,
             keep_work: true,

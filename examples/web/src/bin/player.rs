@@ -1,15 +1,15 @@
 //! The player of a page, without Bevy.
 //!
-//! In: a canvas, then a file, then cameras and times. Out: pictures on the canvas. The page calls [`Player`] from
-//! JavaScript (`page/player.js`); nothing here waits: a file is opened in steps, and the page asks whether the device
-//! has finished the last picture.
+//! In: a canvas, then a file, then cameras and times. Out: pictures on the canvas, of the beginning of a file before all
+//! of it has been received. The page calls [`Player`] from JavaScript (`page/player.js`); nothing here waits: a file is
+//! opened in steps, and the page asks whether the device has finished the last picture.
 
 use bevy_gs4d::renderer::{
     ActiveList, CaptureUpload, Design, GpuCapture, GpuContext, Instance, Renderer, ShaderChecks, ViewParameters,
     ViewRenderer,
 };
 use bevy_gs4d::scene::{Importances, RuntimeScene};
-use bevy_gs4d::view::{Appearance, Background, Optics, View};
+use bevy_gs4d::view::{Appearance, Background, Optics, Thinning, View};
 use glam::{Mat4, UVec2};
 use gs4d_web::{About, Faults, Opening, Step, report_panics, view};
 use std::sync::Arc;
@@ -29,6 +29,9 @@ const UPLOAD: u64 = 1 << 18;
 /// memory for them.
 const UPLOADED_AT_ONCE: u64 = 1 << 22;
 
+/// An importance that every Gaussian exceeds that can be seen, capture units.
+const FAINTEST: f32 = 1e-30;
+
 /// A player on a canvas.
 #[wasm_bindgen]
 pub struct Player {
@@ -40,6 +43,8 @@ pub struct Player {
     view: ViewRenderer,
     present: Present,
     opening: Option<Loader>,
+    /// The beginning of the file that is being received.
+    preview: Option<Loader>,
     shown: Option<Shown>,
     /// The background in place of that of the capture.
     background: Option<[f32; 3]>,
@@ -50,10 +55,11 @@ pub struct Player {
     taken: Arc<AtomicBool>,
 }
 
-/// A file that is being opened.
+/// A file, or the beginning of one, that is being opened.
 enum Loader {
     Reading(Opening),
-    Read(Box<RuntimeScene>),
+    /// With the share of the Gaussians of the file that the scene has.
+    Read(Box<RuntimeScene>, f32),
     /// With the bytes that were uploaded since the device had taken all.
     Uploading(Box<CaptureUpload<RuntimeScene>>, Kept, u64),
     Uploaded(Box<Shown>),
@@ -65,9 +71,11 @@ struct Kept {
     background: Background,
     optics: Optics,
     importances: Importances,
+    /// The share of the Gaussians of the file that the scene has.
+    of: f32,
 }
 
-/// The capture that is shown.
+/// The capture that is shown, or its beginning.
 struct Shown {
     capture: GpuCapture,
     active: Option<ActiveList>,
@@ -75,10 +83,17 @@ struct Shown {
 }
 
 impl Shown {
-    /// Returns the capture in a view, thinned to the most important share of its Gaussians.
+    /// Returns the capture in a view, thinned to the most important share of its Gaussians. Those of the beginning of a
+    /// file also fill the gaps of the Gaussians that are missing.
     fn instance(&self, view: View, share: f32) -> Instance<'_> {
-        let importances = &self.kept.importances;
-        let thinning = importances.thinning(importances.least_of(share));
+        let Kept { importances, of, .. } = &self.kept;
+        let least = importances.least_of(share);
+        let thinning = if *of < 1.0 {
+            let least = least.max(FAINTEST);
+            Thinning::new(least, importances.share_above(least) * of)
+        } else {
+            importances.thinning(least)
+        };
         let appearance = Appearance { thinning, ..Appearance::default() };
         Instance { capture: &self.capture, active: self.active.as_ref(), view, appearance }
     }
@@ -86,6 +101,70 @@ impl Shown {
     fn parameters(&self, background: Option<[f32; 3]>) -> ViewParameters<'static> {
         let background = background.map_or(self.kept.background, Background::Color);
         ViewParameters { background, depths: false, ..ViewParameters::default() }
+    }
+}
+
+impl Player {
+    /// Does one step of a file. Returns the file, if there are further steps, and what there is to tell about its capture
+    /// when it is shown.
+    ///
+    /// # Errors
+    /// As [`step`](Self::step).
+    fn advance(&mut self, file: Loader) -> Result<(Option<Loader>, Option<About>), String> {
+        let GpuContext { device, queue, .. } = &self.context;
+        let next = match file {
+            Loader::Reading(mut opening) => match opening.advance()? {
+                Step::Part => Loader::Reading(opening),
+                Step::Scene(scene) => Loader::Read(scene, opening.share()),
+            },
+            Loader::Read(scene, of) => {
+                let kept = Kept {
+                    about: About::of(&scene),
+                    background: scene.trained_background(),
+                    optics: scene.trained_with.optics(),
+                    importances: Importances::of(&scene),
+                    of,
+                };
+                let upload = CaptureUpload::new(device, &self.renderer, *scene).map_err(|e| e.to_string())?;
+                ViewRenderer::check_room(device, upload.most_drawn()).map_err(|e| e.to_string())?;
+                Loader::Uploading(Box::new(upload), kept, 0)
+            }
+            uploading @ Loader::Uploading(..) if self.waits() => uploading,
+            Loader::Uploading(mut upload, kept, before) => {
+                let uploaded = upload.advance(queue, &self.renderer, UPLOAD);
+                if uploaded > 0 {
+                    let mut all = before + uploaded;
+                    if all >= UPLOADED_AT_ONCE {
+                        all = 0;
+                        self.taken.store(false, Ordering::Relaxed);
+                        let taken = self.taken.clone();
+                        queue.on_submitted_work_done(move || taken.store(true, Ordering::Relaxed));
+                    }
+                    Loader::Uploading(upload, kept, all)
+                } else {
+                    let capture = upload.finish(queue, &self.renderer);
+                    let active = ActiveList::new(device, &self.renderer, &capture);
+                    Loader::Uploaded(Box::new(Shown { capture, active, kept }))
+                }
+            }
+            Loader::Uploaded(shown) => {
+                // The passes are compiled here, so that the first picture does not take long.
+                let size = UVec2::new(self.configuration.width, self.configuration.height);
+                let view = view(&Mat4::IDENTITY.to_cols_array(), &[0.5, 0.5], size, 0.0, shown.kept.optics)?;
+                let prepared = self.view.prepare(
+                    device,
+                    queue,
+                    &self.renderer,
+                    &[shown.instance(view, self.share)],
+                    &shown.parameters(self.background),
+                );
+                prepared.map_err(|e| e.to_string())?;
+                let about = shown.kept.about.clone();
+                self.shown = Some(*shown);
+                return Ok((None, Some(about)));
+            }
+        };
+        Ok((Some(next), None))
     }
 }
 
@@ -125,7 +204,7 @@ impl Player {
         surface.configure(device, &configuration);
         let view = ViewRenderer::new(device, &renderer);
         let present = Present::new(device, format);
-        let (opening, shown, background) = (None, None, None);
+        let (opening, preview, shown, background) = (None, None, None, None);
         let [finished, taken] = [true; 2].map(|done| Arc::new(AtomicBool::new(done)));
         Ok(Self {
             context,
@@ -136,6 +215,7 @@ impl Player {
             view,
             present,
             opening,
+            preview,
             shown,
             background,
             share: 1.0,
@@ -172,11 +252,11 @@ impl Player {
         self.share = share;
     }
 
-    /// Begins to open a file, whose length is 0 if it is not known. The capture that is shown stays until the file is
-    /// open.
+    /// Begins to open a file, whose length is 0 if it is not known. The capture that is shown stays until the file, or a
+    /// preview of it, is open.
     pub fn open(&mut self, name: &str, length: usize) {
         // The memory of a file that was being opened is free before that of the next is needed.
-        self.opening = None;
+        (self.opening, self.preview) = (None, None);
         self.opening = Some(Loader::Reading(Opening::new(name, length)));
     }
 
@@ -191,72 +271,38 @@ impl Player {
         }
     }
 
-    /// Does one step of opening. Returns what there is to tell about the capture when it is shown.
+    /// Begins a preview of the file: of the layers that have been received, if there are more of them than at the last
+    /// call. Returns whether it did.
+    pub fn begin_preview(&mut self) -> bool {
+        let Some(Loader::Reading(opening)) = &mut self.opening else { return false };
+        self.preview = opening.beginning().map(Loader::Reading);
+        self.preview.is_some()
+    }
+
+    /// Does one step of the preview. Returns what there is to tell about the beginning of the capture when it is shown.
+    ///
+    /// # Errors
+    /// A message about a damaged layer, or a capture that the device cannot draw. The preview is then at its end;
+    /// [`step`](Self::step) has the same fault.
+    pub fn step_preview(&mut self) -> Result<Option<About>, String> {
+        let file = self.preview.take().ok_or("no preview was begun")?;
+        let (next, about) = self.advance(file)?;
+        self.preview = next;
+        Ok(about)
+    }
+
+    /// Does one step of opening, once all bytes have been received. Returns what there is to tell about the capture when
+    /// it is shown, in place of a preview.
     ///
     /// # Errors
     /// A message about a file of an unknown format, a damaged file, or a capture that the device cannot draw.
     pub fn step(&mut self) -> Result<Option<About>, String> {
-        let GpuContext { device, queue, .. } = &self.context;
-        match self.opening.take() {
-            None => Err("no file is being opened".to_owned()),
-            Some(Loader::Reading(mut opening)) => {
-                self.opening = Some(match opening.advance()? {
-                    Step::Part => Loader::Reading(opening),
-                    Step::Scene(scene) => Loader::Read(scene),
-                });
-                Ok(None)
-            }
-            Some(Loader::Read(scene)) => {
-                let kept = Kept {
-                    about: About::of(&scene),
-                    background: scene.trained_background(),
-                    optics: scene.trained_with.optics(),
-                    importances: Importances::of(&scene),
-                };
-                let upload = CaptureUpload::new(device, &self.renderer, *scene).map_err(|e| e.to_string())?;
-                ViewRenderer::check_room(device, upload.most_drawn()).map_err(|e| e.to_string())?;
-                self.opening = Some(Loader::Uploading(Box::new(upload), kept, 0));
-                Ok(None)
-            }
-            Some(uploading @ Loader::Uploading(..)) if self.waits() => {
-                self.opening = Some(uploading);
-                Ok(None)
-            }
-            Some(Loader::Uploading(mut upload, kept, before)) => {
-                let uploaded = upload.advance(queue, &self.renderer, UPLOAD);
-                if uploaded > 0 {
-                    let mut all = before + uploaded;
-                    if all >= UPLOADED_AT_ONCE {
-                        all = 0;
-                        self.taken.store(false, Ordering::Relaxed);
-                        let taken = self.taken.clone();
-                        queue.on_submitted_work_done(move || taken.store(true, Ordering::Relaxed));
-                    }
-                    self.opening = Some(Loader::Uploading(upload, kept, all));
-                    return Ok(None);
-                }
-                let capture = upload.finish(queue, &self.renderer);
-                let active = ActiveList::new(device, &self.renderer, &capture);
-                self.opening = Some(Loader::Uploaded(Box::new(Shown { capture, active, kept })));
-                Ok(None)
-            }
-            Some(Loader::Uploaded(shown)) => {
-                // The passes are compiled here, so that the first picture does not take long.
-                let size = UVec2::new(self.configuration.width, self.configuration.height);
-                let view = view(&Mat4::IDENTITY.to_cols_array(), &[0.5, 0.5], size, 0.0, shown.kept.optics)?;
-                let prepared = self.view.prepare(
-                    device,
-                    queue,
-                    &self.renderer,
-                    &[shown.instance(view, self.share)],
-                    &shown.parameters(self.background),
-                );
-                prepared.map_err(|e| e.to_string())?;
-                let about = shown.kept.about.clone();
-                self.shown = Some(*shown);
-                Ok(Some(about))
-            }
-        }
+        // A preview that is not at its end would replace the capture.
+        self.preview = None;
+        let file = self.opening.take().ok_or("no file is being opened")?;
+        let (next, about) = self.advance(file)?;
+        self.opening = next;
+        Ok(about)
     }
 
     /// Returns whether a step does nothing yet: the device has to take what was uploaded.
@@ -268,7 +314,7 @@ impl Player {
     pub fn progress(&self) -> f32 {
         match &self.opening {
             Some(Loader::Reading(opening)) => opening.progress(),
-            Some(Loader::Read(_) | Loader::Uploading(..) | Loader::Uploaded(_)) | None => 1.0,
+            Some(Loader::Read(..) | Loader::Uploading(..) | Loader::Uploaded(_)) | None => 1.0,
         }
     }
 
