@@ -172,6 +172,10 @@ const REFUSED: &[(&str, &str)] = &[
         "finetune a -o o --data d --compress lossless --progressive",
         "--progressive has no effect with the quality lossless",
     ),
+    (
+        "finetune a -o o --data d --compress small --progressive --round-geometry",
+        "the argument '--progressive' cannot be used with '--round-geometry'",
+    ),
     ("finetune a -o o --data d --round-geometry", "the following required arguments were not provided"),
     (
         "finetune a -o o --data d --compress visually-lossless --compress-steps 3",

@@ -123,8 +123,8 @@ fn fewer_bytes_than_the_header_are_nothing_yet() {
 fn other_files_and_damaged_headers_are_refused() {
     assert!(matches!(Beginning::of(b"ply\nformat"), Err(PackageError::NotAPackage)), "another format");
     let (mut bytes, _) = synthetic(true);
-    bytes[8] ^= 0xff;
-    assert!(!matches!(Beginning::of(&bytes), Ok(Some(_))), "another length of the header");
+    bytes[30] ^= 1;
+    assert!(matches!(Beginning::of(&bytes), Err(PackageError::HeaderChecksum)), "a damaged header");
     bytes[15] = 0xff;
     assert!(matches!(Beginning::of(&bytes), Err(PackageError::HeaderTooLong { .. })), "too long a header");
 }
@@ -152,7 +152,9 @@ fn scenes_in_other_forms_are_drawn_whole() {
 fn layers_that_contradict_the_gaussians_are_refused() {
     let (bytes, all) = synthetic(true);
     let scene = package::read(Cursor::new(&bytes)).expect("it can be read");
-    for layers in [vec![0], vec![100], vec![512, 512], vec![512, 256], vec![5_120]] {
+    for layers in
+        [vec![0], vec![100], vec![512, 512], vec![512, 256], vec![5_120], (1..17).map(|block| 256 * block).collect()]
+    {
         let packed = PackedScene { layers: layers.clone(), ..all.clone() };
         let wrong = GaussianScene { form: SceneForm::Ready(Form::Packed(packed)), ..scene.clone() };
         let written = package::write(&mut Vec::new(), &wrong, &WriteSettings::default());

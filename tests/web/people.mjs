@@ -379,6 +379,7 @@ await visit('waiting', '', async ({ page, check, had, until }) => {
   // The first pictures tell how slow the device is.
   const pictures = page.evaluate(() => new Promise((done) => {
     let [count, start] = [0, 0];
+    setTimeout(() => done(0), 60000);
     const draw = gs4d.player.draw.bind(gs4d.player);
     gs4d.player.draw = (...all) => {
       count += 1;
@@ -441,6 +442,9 @@ if (progressive) {
     check('the camera stays', (await camera(page)) === turned, await camera(page));
     check('the time stays', (await seconds(page)) === 1.25, await seconds(page));
     check('it does not play', !(await page.evaluate(() => gs4d.playing)));
+    await page.waitForFunction(() => gs4d.share > 0.7, null, { timeout: 40000 }).catch(() => {});
+    const sharp = await page.evaluate(() => gs4d.share);
+    check('the whole capture gets sharper at rest', sharp > 0.7, sharp);
     check('no progress is told any more', await page.locator('#loading').isHidden());
     const last = await drawn(page);
     check('the picture of all is not black', last > 0.05, last);

@@ -82,7 +82,13 @@ export class Opener {
   // Ends what is being opened.
   cancel() {
     this.own?.abort();
+    this.end();
+  }
+
+  // Frees the memory of what is being opened.
+  end() {
     this.own = null;
+    this.player.close?.();
   }
 
   get busy() {
@@ -113,7 +119,7 @@ export class Opener {
       if (own.signal.aborted) return null;
       throw error instanceof Refusal ? error : new Refusal(`${name} was not opened: ${typeof error === 'string' ? error : (error?.message ?? error)}`);
     } finally {
-      if (this.own === own) this.own = null;
+      if (this.own === own) this.end();
     }
   }
 

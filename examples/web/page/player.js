@@ -163,13 +163,13 @@ function frame(now) {
 // The device has finished a picture.
 function finish(now) {
   if (drawn?.start) {
-    quality.learn(now - drawn.start, drawn.share, drawn.moves);
+    if (drawn.learns) quality.learn(now - drawn.start, drawn.share, drawn.moves);
+    // A small picture whose time tells nothing is followed by one that tells how much larger the next may be.
+    else changed ||= drawn.share < 1;
     drawn.start = 0;
   }
   if (pictured !== 'drawn') return;
   pictured = true;
-  // A small first picture is followed by one whose time tells how much larger the next may be.
-  changed ||= drawn.share < 1;
   at('poster').classList.add('gone');
   // What is being received is still told.
   if (!opener.busy) loading(null);
@@ -191,7 +191,7 @@ function draw(moves) {
     player.set_share?.(gaussians);
     player.draw(time, orbit.pose(), orbit.lens(canvas.clientWidth, canvas.clientHeight));
     times.longestDraw = Math.max(times.longestDraw, performance.now() - start);
-    drawn = { start: learns ? start : 0, share, gaussians, moves };
+    drawn = { start, share, gaussians, moves, learns };
     learns = true;
     pictured ||= 'drawn';
   } catch (error) {
@@ -222,21 +222,25 @@ function report(progress) {
   tell('progress', progress);
 }
 
+// What is shown of whose file only the beginning has been received: its title, its address, and what opens it again.
+let partial = null;
+
 // Opens a file. Returns whether it is shown; what was shown, perhaps its beginning, stays if it is not.
 async function open(title, begin, again, address) {
   if (!player) return fail(WITHOUT), false;
   dismiss();
   // Whether the beginning of the file is shown.
-  let begun = false;
+  let begun = Boolean(again) && partial?.title === title && partial.address === address;
   const take = (found) => (begun ? renew(found) : show(found, title, address));
   try {
     const found = await opener.open(title, begin, (beginning) => {
       take(beginning);
-      begun = true;
+      [begun, partial] = [true, { title, address, again }];
       tell('preview', { gaussians: about.gaussians });
     });
     if (!found) return false;
     take(found);
+    partial = null;
     loading(pictured === true ? null : { state: 'compiling', part: 1 });
     tell('loaded', { seconds: duration(), gaussians: about.gaussians });
     return true;
@@ -257,8 +261,9 @@ const openFile = (file) => file && open(file.name, async () => ({ stream: file.s
 function cancel() {
   opener?.cancel();
   loading(null);
-  if (about) say('Loading was cancelled');
-  else fail('Loading was cancelled.', { again: 'Load again', action: () => first() });
+  const again = about ? partial?.again : () => first();
+  if (again) fail('Loading was cancelled.', { again: 'Load again', action: again, closable: Boolean(about) });
+  else say('Loading was cancelled');
 }
 
 // Notes what there is to tell about the capture that is drawn from now on.
@@ -267,7 +272,7 @@ function note(found) {
   found.free?.();
   [changed, learns] = [true, false];
   // A picture that is on its way is of another capture.
-  if (drawn) drawn.start = 0;
+  if (drawn) drawn.learns = false;
   describe();
 }
 

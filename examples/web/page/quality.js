@@ -72,6 +72,6 @@ export class Quality {
 
   // Whether what rests can be drawn better than a picture.
   sharper(drawn) {
-    return this.still > drawn.share || drawn.gaussians < 1;
+    return this.still > drawn.share || drawn.gaussians < 1 || (drawn.moves && drawn.share < 1);
   }
 }

@@ -225,7 +225,8 @@ impl Compress {
     /// Prints and returns the promises of the quality that the compressed scene does not keep; none if single options
     /// replace settings of the quality. `psnr` is that of all pictures to those of the original, dB.
     fn warnings(&self, scene: &RuntimeScene, psnr: Option<f64>) -> Vec<String> {
-        let is_of_quality = self.knobs.settings(self.quality) == CompressSettings::from(self.quality);
+        let settings = CompressSettings { progressive: false, ..self.knobs.settings(self.quality) };
+        let is_of_quality = settings == CompressSettings::from(self.quality);
         let warnings = match &scene.form {
             Form::Packed(packed) if is_of_quality => broken_promises(self.quality, packed, psnr),
             Form::Packed(_) | Form::Sliced(_) => Vec::new(),

@@ -98,7 +98,7 @@ pub(crate) struct FineTune {
     progressive: bool,
     /// Train codebooks on pictures of the rounded geometry of the package. Useful only if geometry has fewer bits than
     /// with `small`.
-    #[arg(long, help_heading = "Experimental", requires = "compress")]
+    #[arg(long, help_heading = "Experimental", requires = "compress", conflicts_with = "progressive")]
     round_geometry: bool,
     /// Steps that train codebooks, after the other steps.
     #[arg(long, value_name = "N", default_value = "2000", requires = "compress", value_parser = values::count(1_000_000))]

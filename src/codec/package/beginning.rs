@@ -10,6 +10,7 @@ use super::error::PackageError;
 use super::header::{Header, StoredForm};
 use super::section::Section;
 use crate::scene::FilterKind;
+use std::io;
 use std::ops::Range;
 
 /// A layer is shown only if it ends at most at this part of the file: a later one would hardly be seen.
@@ -49,7 +50,7 @@ impl Beginning {
             && header.filter.is_none_or(|filter| filter.kind != FilterKind::Window);
         let (mut gaussians, mut bytes) = (Vec::new(), Vec::new());
         let latest = (end as f64 * LATEST) as usize;
-        for count in header.layers.iter().copied().chain([header.gaussians]).filter(|_| is_drawable) {
+        for count in header.layers.iter().copied().chain([header.gaussians]).filter(|&count| is_drawable && count > 0) {
             let own = needed(header, count);
             let last = own.and_then(|own| own.into_iter().map(|index| places[index].end).max());
             if let Some(last) = last.filter(|&last| last <= latest && bytes.last().is_none_or(|&before| before < last))
@@ -77,7 +78,8 @@ impl Beginning {
     /// environment map, sockets, colliders or levels of detail. Its sections are checked when it is read.
     ///
     /// # Errors
-    /// Layers that have not been received whole, or that do not exist.
+    /// Layers that have not been received whole, or that do not exist; too little memory; a package that a reader would
+    /// refuse as a decompression bomb.
     pub fn package(&self, bytes: &[u8], layer: usize) -> Result<Vec<u8>, PackageError> {
         let expected = self.bytes.get(layer).copied().unwrap_or(usize::MAX);
         let truncated = || PackageError::Truncated { expected: expected as u64, found: bytes.len() as u64 };
@@ -89,7 +91,8 @@ impl Beginning {
         envelope::write(&mut package, &header)?;
         let bodies = indices.into_iter().map(|index| bytes.get(self.places[index].clone()).ok_or_else(truncated));
         let bodies = bodies.collect::<Result<Vec<_>, _>>()?;
-        package.reserve_exact(bodies.iter().map(|body| body.len()).sum());
+        let room = package.try_reserve_exact(bodies.iter().map(|body| body.len()).sum());
+        room.map_err(|_| io::Error::from(io::ErrorKind::OutOfMemory))?;
         bodies.into_iter().for_each(|body| package.extend_from_slice(body));
         Ok(package)
     }

@@ -137,7 +137,7 @@ impl Header {
         let is_packed = matches!(self.form, StoredForm::Packed { .. });
         sane(
             self.layers.is_empty() || (is_packed && are_layers(&self.layers, self.gaussians)),
-            "layers that are not ascending numbers of whole blocks of packed Gaussians",
+            "layers that are not ascending numbers of whole blocks of packed Gaussians, or too many",
         )?;
         sane(self.levels.len() <= MAX_LEVELS, "more levels of detail than a capture may have")?;
         check_sizes(self.levels.iter().map(|level| level.pixels)).map_err(PackageError::Inconsistent)?;

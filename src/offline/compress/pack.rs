@@ -3,8 +3,8 @@
 //! In: a scene ready to draw, [`CompressSettings`], codebooks if they have been trained before. Out: the packed scene,
 //! and a [`CompressReport`].
 //!
-//! The Gaussians are sorted in Morton order, perhaps in layers, and encoded as records (`scene::packed`); their colors are rounded, or
-//! coded by codebooks.
+//! The Gaussians are sorted in Morton order, perhaps in layers, and encoded as records (`scene::packed`); their colors
+//! are rounded, or coded by codebooks.
 
 use super::codebook::Centers;
 use super::coded_colors::coded_colors;

@@ -8,7 +8,7 @@
 use super::lanes::BLOCK;
 use super::morton::by_code;
 pub use super::morton::is_filler;
-use super::strays::{append, set_apart};
+use super::strays::{append, most, set_apart};
 use crate::gaussian::Gaussian;
 use rayon::prelude::*;
 
@@ -35,7 +35,8 @@ impl Order {
     }
 }
 
-/// Returns the Gaussians in layers of descending [importance](Gaussian::importance), each in Morton order.
+/// Returns the Gaussians in layers of descending [importance](Gaussian::importance), each in Morton order; in one layer
+/// if several would have too many fillers.
 fn progressive_order(gaussians: &[Gaussian]) -> Order {
     let importances: Vec<f32> = gaussians.par_iter().map(Gaussian::importance).collect();
     let key = |index: &u32| importances[*index as usize];
@@ -54,6 +55,9 @@ fn progressive_order(gaussians: &[Gaussian]) -> Order {
         }
         append(&mut order.indices, &set_apart(gaussians, by_code(gaussians, layer.to_vec())));
         start += layer.len();
+    }
+    if order.indices.len() > most(gaussians.len()) {
+        return Order { indices: morton_order(gaussians), layers: Vec::new() };
     }
     order
 }
@@ -99,6 +103,23 @@ mod tests {
                 assert!(least >= most, "{least} before the end of a layer, {most} after it");
             }
         }
+    }
+
+    #[test]
+    fn many_groups_far_apart_are_one_layer() {
+        let mut random = Random::new(3);
+        let of_group = |group: u32| (0..250).map(move |_| group);
+        let gaussians: Vec<Gaussian> = (0..400)
+            .flat_map(of_group)
+            .map(|group| {
+                let near = gaussian(&mut random);
+                let at = [group % 20, group / 20, 0].map(|axis| 1e3 * axis as f32);
+                Gaussian { mean: [0, 1, 2].map(|axis| near.mean[axis] + at[axis]), ..near }
+            })
+            .collect();
+        let order = Order::of(&gaussians, true);
+        assert!(order.indices.len() <= most(gaussians.len()), "{} places", order.indices.len());
+        assert_eq!(order.layers, [0; 0], "each layer would have a block for each group");
     }
 
     #[test]

@@ -19,8 +19,8 @@ pub struct PackedScene {
     /// Their color.
     pub colors: PackedColors,
     /// Numbers of Gaussians up to the ends of the layers but the last, ascending multiples of [`BLOCK`]: the Gaussians
-    /// of a layer are less important than those before it, so that the first layers show the scene coarsely. Empty:
-    /// one layer.
+    /// of a layer are less important than those before it, so that the first layers show the scene coarsely. At most
+    /// 15. Empty: one layer.
     pub layers: Vec<usize>,
 }
 
@@ -68,7 +68,7 @@ impl PackedScene {
             return Err("the ranges do not fit the number of Gaussians");
         }
         if !are_layers(&self.layers, self.len()) {
-            return Err("layers that are not ascending numbers of whole blocks");
+            return Err("layers that are not ascending numbers of whole blocks, or too many");
         }
         if !self.ranges.as_flattened().iter().all(|value| value.is_finite()) {
             return Err("a range that is not finite");
@@ -84,8 +84,11 @@ impl PackedScene {
     }
 }
 
+/// Largest number of ends of layers.
+const MAX_LAYER_ENDS: usize = 15;
+
 /// Returns whether these are numbers of Gaussians, of `count`, at which layers but the last can end.
 pub(crate) fn are_layers(layers: &[usize], count: usize) -> bool {
     let ascending = layers.is_sorted_by(|a, b| a < b) && layers.last().is_none_or(|&last| last < count);
-    ascending && layers.iter().all(|&end| end > 0 && end.is_multiple_of(BLOCK))
+    ascending && layers.len() <= MAX_LAYER_ENDS && layers.iter().all(|&end| end > 0 && end.is_multiple_of(BLOCK))
 }

@@ -1,6 +1,7 @@
 //! Some of the Gaussians of a packed scene, without a change of their values.
 //!
-//! In: a packed scene, the indices of the Gaussians that it keeps. Out: their records, with the ranges of their blocks.
+//! In: a packed scene, the indices of the Gaussians that it keeps. Out: their records, with the ranges of their blocks and the
+//! ends of their layers.
 //! A record is decoded by the ranges of its block: Gaussians of two blocks never share one, and a block that loses some
 //! ends with fillers.
 

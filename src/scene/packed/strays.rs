@@ -61,9 +61,13 @@ pub(super) fn set_apart(gaussians: &[Gaussian], order: Vec<u32>) -> Vec<u32> {
     let mut is_stray = vec![false; gaussians.len()];
     strays.iter().for_each(|&index| is_stray[index as usize] = true);
     let apart = arranged(gaussians, &near, strays);
-    let most = gaussians.len() + gaussians.len() / 4 + FILLED * BLOCK;
     let is_finer = || error(gaussians, &apart, &is_stray) < GAIN * error(gaussians, &order, &is_stray);
-    if apart.len() <= most && is_finer() { apart } else { order }
+    if apart.len() <= most(gaussians.len()) && is_finer() { apart } else { order }
+}
+
+/// Returns the largest number of places of an order of this many Gaussians, with its fillers.
+pub(super) fn most(count: usize) -> usize {
+    count + count / 4 + FILLED * BLOCK
 }
 
 /// Returns the sum of the squared errors of all means but those of strays, weighted by squared opacity. An error counts

@@ -260,6 +260,11 @@ impl Player {
         self.opening = Some(Loader::Reading(Opening::new(name, length)));
     }
 
+    /// Ends the opening of a file, whose memory is free then. What is shown stays.
+    pub fn close(&mut self) {
+        (self.opening, self.preview) = (None, None);
+    }
+
     /// Receives bytes of the file. [`step`](Self::step) begins once all have been received.
     ///
     /// # Errors
