@@ -4,50 +4,42 @@
 //! package of its first layers, that each further layer is closer to the whole capture on the CPU, and that larger and
 //! more opaque Gaussians make up for those that are missing.
 
+use crate::support::bundled::{BUNDLED, bundled, drawn, view_of};
 use crate::support::psnr::psnr;
 use bevy_gs4d::codec::package::{self, Beginning, PackageError, WriteSettings};
-use bevy_gs4d::codec::{self, ReadOptions};
-use bevy_gs4d::reference::{Layer, render_layers};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
-use bevy_gs4d::scene::{Bounds, Form, GaussianScene, PackedColors, PackedScene, Packing, RuntimeScene, SceneForm};
-use bevy_gs4d::view::{Appearance, Background, BlendSpace, Camera, Frame, RasterFov, Thinning, View};
-use glam::{UVec2, Vec3};
+use bevy_gs4d::scene::{Form, GaussianScene, PackedColors, PackedScene, Packing, SceneForm};
+use bevy_gs4d::view::{Frame, Thinning, View};
+use glam::Vec3;
 use std::io::Cursor;
-use std::path::Path;
 
 /// Returns the package of a bundled capture in layers, and a view of it.
 fn layered(name: &str, up: Vec3) -> (Vec<u8>, View) {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets").join(name);
-    let scene = codec::load(&path, &ReadOptions::default()).expect("a bundled capture").unpacked();
-    let scene = scene.into_runtime().expect("it can be drawn");
-    let center = Bounds::core(scene.iter()).expect("it has Gaussians").center();
-    let eye = center + (Vec3::new(0.7, 0.6, 0.6) + 0.5 * up).normalize() * 3.9;
-    let camera = Camera::look_at(eye, center, up, 0.85, UVec2::new(320, 320));
+    let scene = bundled(name).unpacked().into_runtime().expect("it can be drawn");
+    let view = view_of(&scene, up);
     let packed = scene.pack(&Packing { progressive: true, ..Packing::default() }).expect("the scene fits");
     let mut bytes = Vec::new();
     package::write(&mut bytes, &GaussianScene::from(packed), &WriteSettings { level: 1 }).expect("it can be written");
-    (bytes, camera.view(0.5, RasterFov::Corrected))
+    (bytes, view)
 }
 
-fn drawn(package: &[u8], view: View, thinning: Thinning) -> Frame {
+fn drawn_package(package: &[u8], view: View, thinning: Thinning) -> Frame {
     let scene = package::read(Cursor::new(package)).expect("a package");
-    let scene: RuntimeScene = scene.into_runtime().expect("it can be drawn");
-    let layer = Layer { scene: &scene, view, appearance: Appearance { thinning, ..Appearance::default() } };
-    render_layers(&[layer], Background::Color([0.0; 3]), BlendSpace::Encoded)
+    drawn(&scene.into_runtime().expect("it can be drawn"), view, thinning)
 }
 
 #[test]
 fn each_layer_is_closer_to_the_capture() {
-    for (name, up) in [("island.gs4d", Vec3::Y), ("toybox.gs4d", Vec3::Z)] {
+    for (name, up) in BUNDLED {
         let (bytes, view) = layered(name, up);
-        let whole = drawn(&bytes, view, Thinning::default());
+        let whole = drawn_package(&bytes, view, Thinning::default());
         let beginning = Beginning::of(&bytes).expect("a package").expect("the header is there");
         let mut before = 0.0;
         for (layer, &end) in beginning.layers().iter().enumerate() {
             let part = beginning.package(&bytes[..end], layer).expect("the layer is there");
             let share = beginning.share(layer);
-            let bare = psnr(&drawn(&part, view, Thinning::default()), &whole);
-            let filled = psnr(&drawn(&part, view, Thinning::new(1e-30, share)), &whole);
+            let bare = psnr(&drawn_package(&part, view, Thinning::default()), &whole);
+            let filled = psnr(&drawn_package(&part, view, Thinning::new(1e-30, share)), &whole);
             println!("{name}, {share:.2} of the Gaussians: {bare:.2} dB unchanged, {filled:.2} dB filled");
             assert!(filled > 16.0 && filled > before, "{name}, {share}: {filled:.2} dB, more than {before:.2}");
             assert!(filled > bare + 0.3 || share == 1.0, "{name}, {share}: {filled:.2} dB filled, {bare:.2} unchanged");

@@ -52,6 +52,7 @@ mod support {
     #[cfg(feature = "offline")]
     pub mod allocations;
     pub mod blob;
+    pub mod bundled;
     pub mod coded_scene;
     pub mod data;
     pub mod golden;

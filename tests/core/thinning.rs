@@ -3,23 +3,16 @@
 //! In: the bundled captures. Out: proof that larger and more opaque Gaussians fill the gaps of those that are left out,
 //! and that the picture changes little when the least importance does.
 
+use crate::support::bundled::{BUNDLED, bundled, drawn, view_of};
 use crate::support::psnr::psnr;
-use bevy_gs4d::codec::{self, ReadOptions};
-use bevy_gs4d::reference::{Layer, render_layers};
-use bevy_gs4d::scene::{Bounds, RuntimeScene};
-use bevy_gs4d::view::{Appearance, Background, BlendSpace, Camera, Frame, RasterFov, Thinning, View};
-use glam::{UVec2, Vec3};
-use std::path::Path;
+use bevy_gs4d::scene::RuntimeScene;
+use bevy_gs4d::view::{Thinning, View};
+use glam::Vec3;
 
-/// Returns a bundled capture, and a view of it at half of its time.
-fn bundled(name: &str, up: Vec3) -> (RuntimeScene, View) {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets").join(name);
-    let scene = codec::load(&path, &ReadOptions::default()).expect("a bundled capture");
-    let scene = scene.into_runtime().expect("it can be drawn");
-    let center = Bounds::core(scene.iter()).expect("it has Gaussians").center();
-    let eye = center + (Vec3::new(0.7, 0.6, 0.6) + 0.5 * up).normalize() * 3.9;
-    let camera = Camera::look_at(eye, center, up, 0.85, UVec2::new(320, 320));
-    let view = camera.view(0.5, RasterFov::Corrected);
+/// Returns a bundled capture, and a view of it.
+fn viewed(name: &str, up: Vec3) -> (RuntimeScene, View) {
+    let scene = bundled(name).into_runtime().expect("it can be drawn");
+    let view = view_of(&scene, up);
     (scene, view)
 }
 
@@ -30,15 +23,10 @@ fn least_of(scene: &RuntimeScene, share: f32) -> f32 {
     all[(share * all.len() as f32) as usize]
 }
 
-fn drawn(scene: &RuntimeScene, view: View, thinning: Thinning) -> Frame {
-    let layer = Layer { scene, view, appearance: Appearance { thinning, ..Appearance::default() } };
-    render_layers(&[layer], Background::Color([0.0; 3]), BlendSpace::Encoded)
-}
-
 #[test]
 fn larger_and_more_opaque_gaussians_fill_the_gaps() {
-    for (name, up) in [("island.gs4d", Vec3::Y), ("toybox.gs4d", Vec3::Z)] {
-        let (scene, view) = bundled(name, up);
+    for (name, up) in BUNDLED {
+        let (scene, view) = viewed(name, up);
         let whole = drawn(&scene, view, Thinning::default());
         let mut before = f64::INFINITY;
         for share in [0.6, 0.4, 0.25] {
@@ -55,7 +43,7 @@ fn larger_and_more_opaque_gaussians_fill_the_gaps() {
 
 #[test]
 fn a_small_change_of_the_least_importance_changes_the_picture_little() {
-    let (scene, view) = bundled("toybox.gs4d", Vec3::Z);
+    let (scene, view) = viewed("toybox.gs4d", Vec3::Z);
     let least = least_of(&scene, 0.5);
     let share = |least: f32| {
         let above = scene.iter().filter(|gaussian| gaussian.importance() > least).count();
