@@ -64,7 +64,7 @@ fn a_still() -> Vec<u8> {
 
 /// Returns a package in layers, and the bytes after which the first of them can be drawn.
 fn a_progressive() -> (Vec<u8>, usize) {
-    let scene = synthesize(&SynthSettings { count: 30_000, degree: 1, ..SynthSettings::default() });
+    let scene = synthesize(&SynthSettings { count: 10_000, degree: 1, ..SynthSettings::default() });
     let scene = scene.into_runtime().expect("a synthetic scene can be drawn");
     let packed = scene.pack(&Packing { progressive: true, ..Packing::default() }).expect("its values fit");
     let mut package = Vec::new();
