@@ -16,7 +16,9 @@ const DIFFERS: f32 = 2.0;
 const TINTED: f32 = 1.14;
 /// Luminance, 0 to 255, of pixels that tell a gain.
 const USABLE: [f32; 2] = [12.0, 240.0];
-/// Fewest pixels that tell a gain.
+/// Least luminance of a pixel that shows something: where pictures leave out the background they are black.
+const SHOWN: f32 = 2.0;
+/// Fewest pixels that tell a gain, or a brightness.
 const FEWEST: usize = 200;
 const REMEDY: &str = "Lock the exposure of the cameras; `--exposure=on` trains a color for each camera, and is the \
                       default for several cameras that stand still.";
@@ -89,7 +91,8 @@ fn gain(first: &Sample, other: &Sample) -> Option<f32> {
     if gains.len() < FEWEST { None } else { median(gains) }
 }
 
-/// Returns the median luminance of a camera, and its mean red and blue over its mean green; `None` without pictures.
+/// Returns the median luminance of what a camera shows, and its mean red and blue over its mean green; `None` without
+/// pictures, or if they are nearly black.
 fn look(seen: &Seen) -> Option<[f32; 3]> {
     let sample = seen.shown().next()?;
     let mut sums = [0.0_f64; 3];
@@ -97,8 +100,9 @@ fn look(seen: &Seen) -> Option<[f32; 3]> {
         sums.iter_mut().zip(pixel.0).for_each(|(sum, value)| *sum += f64::from(value));
     }
     let [red, green, blue] = sums.map(|sum| sum as f32);
-    (green > 0.0).then_some(())?;
-    Some([median(sample.gray.values.clone())?, red / green, blue / green])
+    let shown: Vec<f32> = sample.gray.values.iter().copied().filter(|value| *value >= SHOWN).collect();
+    (green > 0.0 && shown.len() >= FEWEST).then_some(())?;
+    Some([median(shown)?, red / green, blue / green])
 }
 
 #[cfg(test)]
@@ -123,6 +127,18 @@ mod tests {
     #[test]
     fn equal_cameras_have_no_finding() {
         assert_eq!(found(|_, _| 1.0, 9), [], "one exposure");
+    }
+
+    #[test]
+    fn cameras_that_leave_out_the_background_have_no_finding() {
+        let cameras = (0..4).map(|camera| {
+            let mut picture = textured(1.0, 0.0, 1.0);
+            // Another share of each picture is black, always more than half.
+            let black = picture.height() * (6 + camera as u32) / 10;
+            picture.enumerate_pixels_mut().filter(|(_, y, _)| *y < black).for_each(|(.., pixel)| pixel.0 = [0; 3]);
+            seen(camera, 4, vec![picture; 5])
+        });
+        assert_eq!(exposure(&evidence(cameras.collect())), [], "what is black is not compared");
     }
 
     #[test]
