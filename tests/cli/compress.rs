@@ -58,6 +58,12 @@ fn progressive_packages_have_layers_that_can_be_drawn_early() {
         let text = gs4d(&arguments!["info", &out]).text();
         let share = format!("after {:.0} %", 100.0 * ends[0] as f64 / info["bytes"].as_f64().expect("the size"));
         assert!(text.contains("drawn coarsely") && text.contains(&share), "{share} is told: {text}");
+        let rate = info["megabits_per_second"].as_f64().expect("the capture plays");
+        let [bytes, seconds] =
+            [&info["bytes"], &info["switches"]["playback"]["duration_seconds"]].map(|value| value.as_f64());
+        let expected = bytes.expect("the size") * 8e-6 / seconds.expect("the duration");
+        assert!((rate / expected - 1.0).abs() < 1e-6, "{rate}, not {expected} Mbit/s");
+        assert!(text.contains(&format!("{rate:.1} Mbit/s")), "the bit rate is told: {text}");
     }
 }
 

@@ -154,6 +154,10 @@ impl Info {
         if let Some(shares) = package.and_then(shares_of_layers) {
             pairs.push(("drawn coarsely", format!("after {shares} of the file")));
         }
+        let rate = bit_rate(size, &facts.playback);
+        if let Some(rate) = rate {
+            pairs.push(("bit rate", format!("{rate:.1} Mbit/s")));
+        }
         if let Some(Extent { all, core }) = &extent {
             pairs.extend([("bounds", corners(all)), ("middle", corners(core))]);
         }
@@ -177,6 +181,7 @@ impl Info {
             "levels": facts.levels,
             "sockets": facts.sockets,
             "colliders": facts.colliders,
+            "megabits_per_second": rate,
             "bounds": extent.as_ref().map(|extent| box_json(&extent.all)),
             "core": extent.as_ref().map(|extent| box_json(&extent.core)),
             "package": package.map(package_json),
@@ -323,6 +328,12 @@ fn shares_of_layers(info: &PackageInfo) -> Option<String> {
     let share = |&bytes: &usize| format!("{:.0} %", 100.0 * bytes as f64 / info.file_length.max(1) as f64);
     let shares: Vec<String> = info.layers.iter().map(share).collect();
     (!shares.is_empty()).then(|| shares.join(", "))
+}
+
+/// Returns the rate at which a link must be to bring a file during one pass, Mbit/s; `None` for a still.
+fn bit_rate(size: u64, playback: &PlaybackHints) -> Option<f64> {
+    let seconds = playback.duration_seconds;
+    (seconds > 0.0).then(|| size as f64 * 8e-6 / f64::from(seconds))
 }
 
 /// Returns a table with one row for all sections of the same name, in the order of the file.
