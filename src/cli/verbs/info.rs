@@ -330,7 +330,7 @@ fn shares_of_layers(info: &PackageInfo) -> Option<String> {
     (!shares.is_empty()).then(|| shares.join(", "))
 }
 
-/// Returns the rate at which a link must be to bring a file during one pass, Mbit/s; `None` for a still.
+/// Returns the bit rate of a link that brings a file during one pass, Mbit/s; `None` for a still.
 fn bit_rate(size: u64, playback: &PlaybackHints) -> Option<f64> {
     let seconds = playback.duration_seconds;
     (seconds > 0.0).then(|| size as f64 * 8e-6 / f64::from(seconds))
