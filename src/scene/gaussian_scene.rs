@@ -2,6 +2,7 @@
 //!
 //! In: the result of a codec. Out: a [`GaussianScene`], checked.
 
+use super::chunk_table::ChunkTable;
 use super::collider::Colliders;
 use super::environment::Environment;
 use super::filter::TemporalFilter;
@@ -31,6 +32,8 @@ pub struct GaussianScene {
     pub sockets: Vec<Socket>,
     /// Meshes of the solid parts; usually none. Levels of detail have none. Shared, because they do not change.
     pub colliders: Option<Arc<Colliders>>,
+    /// The chunk files that have its Gaussians; `None` for every capture but the index of one in chunk files.
+    pub chunks: Option<Arc<ChunkTable>>,
 }
 
 impl GaussianScene {
@@ -68,6 +71,7 @@ impl GaussianScene {
         check_around(self.len(), self.filter.as_ref(), self.environment.as_ref())?;
         check_sockets(&self.sockets)?;
         self.colliders.as_deref().map_or(Ok(()), Colliders::check)?;
+        self.chunks.as_deref().map_or(Ok(()), ChunkTable::check)?;
         check_levels(&self.levels, &self.trained_with, self.environment.is_some())
     }
 }
@@ -83,6 +87,7 @@ impl From<RuntimeScene> for GaussianScene {
             levels: scene.levels,
             sockets: scene.sockets,
             colliders: scene.colliders,
+            chunks: scene.chunks,
         }
     }
 }

@@ -60,5 +60,6 @@ pub fn grow(
         levels: Vec::new(),
         sockets: scene.sockets.clone(),
         colliders: scene.colliders.clone(),
+        chunks: None,
     })
 }

@@ -5,6 +5,7 @@
 //! Gaussians may have.
 
 mod bounds;
+mod chunk_table;
 mod collider;
 mod conversion;
 pub(crate) mod detail;
@@ -12,6 +13,7 @@ pub mod edit;
 mod environment;
 pub(crate) mod filter;
 mod form;
+mod gaussian_bytes;
 mod gaussian_scene;
 pub mod grow;
 mod importances;
@@ -29,6 +31,7 @@ mod socket;
 pub mod synth;
 
 pub use bounds::{Bounds, BoundsOverTime};
+pub use chunk_table::{ChunkFile, ChunkTable};
 pub(crate) use collider::ColliderGrid;
 pub use collider::{ColliderMesh, ColliderStretch, Colliders};
 pub(crate) use conversion::Conversion;

@@ -3,6 +3,7 @@
 //! In: Gaussians in a form that is drawn, and the other parts of a capture. Out: a [`RuntimeScene`], which returns its
 //! Gaussians and colors; an error if its parts do not fit together. A [`Level`] is a scene of fewer Gaussians.
 
+use super::chunk_table::ChunkTable;
 use super::collider::Colliders;
 use super::detail::{MAX_LEVELS, check_sizes};
 use super::environment::Environment;
@@ -35,10 +36,12 @@ pub struct RuntimeScene {
     pub sockets: Vec<Socket>,
     /// Meshes of the solid parts; usually none. Levels of detail have none. Shared, because they do not change.
     pub colliders: Option<Arc<Colliders>>,
+    /// The chunk files that have its Gaussians; `None` for every capture but the index of one in chunk files.
+    pub chunks: Option<Arc<ChunkTable>>,
 }
 
-/// A level of detail: a capture of fewer Gaussians, without levels, environment map, temporal filter, sockets and
-/// colliders.
+/// A level of detail: a capture of fewer Gaussians, without levels, environment map, temporal filter, sockets,
+/// colliders and chunk files.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Level {
     /// The largest size on the screen (`pixels_across`) at which it looks nearly the same as all Gaussians, pixels.
@@ -60,6 +63,7 @@ impl RuntimeScene {
             levels: Vec::new(),
             sockets: Vec::new(),
             colliders: None,
+            chunks: None,
         }
     }
 
@@ -106,6 +110,7 @@ impl RuntimeScene {
         check_around(self.len(), self.filter.as_ref(), self.environment.as_ref())?;
         check_sockets(&self.sockets)?;
         self.colliders.as_deref().map_or(Ok(()), Colliders::check)?;
+        self.chunks.as_deref().map_or(Ok(()), ChunkTable::check)?;
         check_levels(&self.levels, &self.trained_with, self.environment.is_some())
     }
 
@@ -174,6 +179,9 @@ pub(super) fn check_levels(
         if !own.sockets.is_empty() || own.colliders.is_some() {
             return Err("a level of detail that has sockets or colliders itself");
         }
+        if own.chunks.is_some() {
+            return Err("a level of detail that is in chunk files itself");
+        }
         if level.scene.trained_with.time_interval != trained_with.time_interval {
             return Err("a level of detail of another time interval");
         }
@@ -236,6 +244,7 @@ mod tests {
             "levels of decreasing size are accepted"
         );
         let map = Environment { width: 1, height: 1, texels: vec![0.0; 3] };
+        let chunks = ChunkTable { stretches: 1, gaussian_bytes: 88, files: Vec::new() };
         let other = TrainedWith { time_interval: [0.0, 2.0], ..TrainedWith::default() };
         let bad = [
             vec![level(8.0, empty()), level(64.0, empty())],
@@ -254,6 +263,7 @@ mod tests {
             )],
             vec![level(8.0, RuntimeScene { trained_with: other, ..empty() })],
             vec![level(8.0, RuntimeScene { colliders: Some(Arc::default()), ..empty() })],
+            vec![level(8.0, RuntimeScene { chunks: Some(Arc::new(chunks.clone())), ..empty() })],
             (0..=MAX_LEVELS).map(|index| level(64.0 - index as f32, empty())).collect(),
         ];
         for (index, levels) in bad.into_iter().enumerate() {
@@ -261,5 +271,9 @@ mod tests {
         }
         let surrounded = RuntimeScene { environment: Some(map), ..with(vec![level(8.0, empty())]) };
         assert!(surrounded.check().is_err(), "levels of a capture with an environment map are refused");
+        let mut index = RuntimeScene { chunks: Some(Arc::new(chunks.clone())), ..empty() };
+        assert_eq!(index.check(), Ok(()), "the index of a capture in chunk files");
+        index.chunks = Some(Arc::new(ChunkTable { stretches: 0, ..chunks }));
+        assert!(index.check().is_err(), "a table that a player cannot use is refused");
     }
 }

@@ -40,6 +40,7 @@ impl GaussianScene {
             levels: Vec::new(),
             sockets: self.sockets.clone(),
             colliders: self.colliders.clone(),
+            chunks: None,
         }
     }
 }

@@ -1,8 +1,8 @@
 //! `gs4d join` and `gs4d split`, run as a user runs them.
 //!
 //! In: synthetic segments. Out: proof that a joined capture looks like each segment within its time and shows nothing of
-//! another one, that it is not larger than its segments, that its chunk files are the same capture, and that files which
-//! cannot be joined or split are refused with a remedy that works.
+//! another one, that it is not larger than its segments, that its chunk files are the same capture and in their index,
+//! and that files which cannot be joined or split are refused with a remedy that works.
 
 use crate::support::command::{arguments, folder, gs4d};
 use crate::support::folders::{contents, names};
@@ -99,13 +99,14 @@ fn chunks_are_the_same_capture() {
     let parts = segments(&folder, 2);
     let (long, _) = joined(&folder, &parts, "long.gs4d", &[]);
     let [chunks, finer] = ["chunks", "finer"].map(|name| folder.path().join(name));
-    let report = gs4d(&arguments!["split", &long, "-o", &chunks, "--json"]).json();
+    let report = gs4d(&arguments!["split", &long, "-o", &chunks, "--layers", "100", "--json"]).json();
     let of_report = |fact: &str| -> Vec<_> {
         report["chunks"].as_array().expect("chunks").iter().map(|chunk| chunk[fact].clone()).collect()
     };
     assert_eq!(report["gaussians"], 1200, "all Gaussians");
     assert_eq!(of_report("gaussians"), [600, 600], "a chunk of a second is a segment");
-    assert_eq!(names(&chunks), ["chunk-00001-of-00002.gs4d", "chunk-00002-of-00002.gs4d"], "the files");
+    let files = ["chunk-00001-of-00002.gs4d", "chunk-00002-of-00002.gs4d", "index.gs4d"];
+    assert_eq!(names(&chunks), files, "the files and their index");
     let first = gs4d(&arguments!["info", chunks.join("chunk-00001-of-00002.gs4d"), "--json"]).json();
     assert_eq!(first["gaussians"], 600, "each is a package");
 
@@ -114,11 +115,11 @@ fn chunks_are_the_same_capture() {
     assert!(fs::read(&back).ok() == fs::read(&long).ok(), "the same bytes");
     let files: Vec<PathBuf> = contents(&chunks).into_keys().collect();
     let (again, _) = joined(&folder, &files, "again.gs4d", &[]);
-    assert!(fs::read(&again).ok() == fs::read(&long).ok(), "the same bytes if each file is named");
+    assert!(fs::read(&again).ok() == fs::read(&long).ok(), "the same bytes if each file and the index is named");
 
     // Runs of several lengths change the order of Gaussians, and no picture.
     gs4d(&arguments!["split", &long, "-o", &finer, "--chunk", "0.25"]).text();
-    assert!(names(&finer).len() > 2, "several runs: {:?}", names(&finer));
+    assert!(names(&finer).len() > 5, "several runs: {:?}", names(&finer));
     let (other, report) = joined(&folder, std::slice::from_ref(&finer), "other.gs4d", &[]);
     assert_eq!(report["gaussians"], 1200, "as many as before");
     let [whole, other] = [&long, &other].map(|path| read(path));
@@ -126,6 +127,58 @@ fn chunks_are_the_same_capture() {
         let found = psnr(&picture(&whole, time), &picture(&other, time));
         assert!(found >= 80.0, "{found} dB at {time}");
     }
+}
+
+#[test]
+fn chunks_are_in_layers_and_the_index_lists_them() {
+    let folder = folder();
+    let (long, _) = joined(&folder, &segments(&folder, 2), "long.gs4d", &[]);
+    let [chunks, again] = ["chunks", "again"].map(|name| folder.path().join(name));
+    let report = gs4d(&arguments!["split", &long, "-o", &chunks, "--json"]).json();
+    let listed = report["chunks"].as_array().expect("chunks");
+    let facts: Vec<_> =
+        listed.iter().map(|chunk| (&chunk["layer"], &chunk["gaussians"], &chunk["stretches"])).collect();
+    let (first, second) = (serde_json::json!([0, 0]), serde_json::json!([1, 1]));
+    let numbers = [0, 1, 300].map(serde_json::Value::from);
+    let [zero, one, half] = &numbers;
+    let expected = [(zero, half, &first), (one, half, &first), (zero, half, &second), (one, half, &second)];
+    assert_eq!(facts, expected, "a quarter of 600 is few: two layers of each second");
+
+    let index = chunks.join("index.gs4d");
+    let sizes: Vec<u64> = contents(&chunks).into_keys().map(|file| size(&file)).collect();
+    let sum: u64 = sizes.iter().sum();
+    assert_eq!((sizes.len(), &report["bytes_out"]), (5, &sum.into()), "four files and the index");
+    assert_eq!(report["index"]["bytes"], size(&index), "the size of the index");
+    let coarse = size(&index) + listed[0]["bytes"].as_u64().expect("a size");
+    assert_eq!(report["first_picture_bytes"], coarse, "the index, and layer 0 of the first second");
+    let rates: Vec<f64> =
+        report["megabits_per_second"].as_array().expect("rates").iter().filter_map(serde_json::Value::as_f64).collect();
+    assert_eq!(rates.len(), 2, "of layer 0, and of both: {report}");
+    assert!((rates[1] - sum as f64 * 8e-6 / 2.0).abs() < 1e-9 && rates[0] < rates[1], "all bytes in two seconds");
+    let text = gs4d(&arguments!["split", &long, "-o", &chunks]).text();
+    for expected in ["layer", "index.gs4d", "first picture", "Mbit/s for layer 0", "up to layer 1"] {
+        assert!(text.contains(expected), "{expected} in {text}");
+    }
+
+    let info = gs4d(&arguments!["info", &index, "--json"]).json();
+    let bytes = sum - size(&index);
+    let expected = serde_json::json!({ "files": 4, "stretches": 2, "layers": 2, "gaussians": 1200, "bytes": bytes });
+    assert_eq!((&info["chunks"], &info["gaussians"]), (&expected, &0.into()), "the files of an empty package: {info}");
+    let text = gs4d(&arguments!["info", &index]).text();
+    assert!(text.contains("the index of 4 chunk files: 1200 Gaussians in 2 layers over 2 stretches"), "{text}");
+    let out = folder.path().join("out.gs4d");
+    for verb in ["convert", "compress", "collide", "mask"] {
+        gs4d(&arguments![verb, &index, "-o", &out]).must_fail("gs4d join FOLDER -o CAPTURE");
+    }
+
+    let (back, report) = joined(&folder, std::slice::from_ref(&chunks), "back.gs4d", &[]);
+    assert_eq!(report["gaussians"], 1200, "as many as before");
+    gs4d(&arguments!["split", &back, "-o", &again]).text();
+    let files = |folder: &Path| contents(folder).into_values().collect::<Vec<_>>();
+    assert!(files(&again) == files(&chunks), "the files of the joined chunks are the same byte for byte");
+    let [whole, other] = [&long, &back].map(|path| read(path));
+    let found = psnr(&picture(&whole, 0.3), &picture(&other, 0.3));
+    assert!(found >= 80.0, "the order of Gaussians changes no picture: {found} dB");
 }
 
 #[test]
@@ -174,9 +227,13 @@ fn a_missing_chunk_is_named_and_other_chunks_are_kept() {
     gs4d(&arguments!["split", &long, "-o", &chunks, "--chunk", "9"]).must_fail("is a chunk of another split");
     gs4d(&arguments!["split", &long, "-o", &chunks]).text();
     gs4d(&arguments!["split", &long, "-o", &chunks, "--chunk", "0.0001"]).must_fail("--chunk");
+    gs4d(&arguments!["split", &long, "-o", &chunks, "--layers", "25,25"]).must_fail("100 in all");
+    let named = folder.path().join("index.gs4d");
+    fs::copy(&long, &named).expect("the folder can be written to");
+    gs4d(&arguments!["split", &named, "-o", folder.path()]).must_fail("the input itself");
     let out = folder.path().join("out.gs4d");
     gs4d(&arguments!["join", &chunks, "-o", &out, "--keep-times"]).must_fail("--keep-times has no effect");
-    fs::remove_file(chunks.join("chunk-00002-of-00002.gs4d")).expect("the file exists");
-    gs4d(&arguments!["join", &chunks, "-o", &out]).must_fail("chunk-00002-of-00002.gs4d is missing");
+    fs::remove_file(chunks.join("chunk-00002-of-00004.gs4d")).expect("the file exists");
+    gs4d(&arguments!["join", &chunks, "-o", &out]).must_fail("chunk-00002-of-00004.gs4d is missing");
     assert!(!out.exists(), "no output is written");
 }

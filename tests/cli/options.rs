@@ -537,7 +537,7 @@ const ALWAYS: &[(&str, &[&str])] = &[
     ),
     ("compare", &[]),
     ("join", &["--level", "--out"]),
-    ("split", &["--chunk", "--level", "--out"]),
+    ("split", &["--chunk", "--layers", "--level", "--out"]),
     ("socket", &["--list", "--points", "--remove"]),
     ("collide", &["--out", "--remove"]),
     ("synth", &["--grow", "--level", "--out", "--seed", "--sh-degree"]),

@@ -106,6 +106,7 @@ const REMEDIES: &[(&str, &str, &str)] = &[
         "choose a lower --rate",
         "collide SCENE.gs4d -o OUT.gs4d --rate 2 --level 0.05 --cells 16 --smallest 1",
     ),
+    ("convert CHUNKS/INDEX.gs4d OUT.gs4d", "gs4d join FOLDER -o CAPTURE", "join CHUNKS -o OUT.gs4d"),
     ("info SCENE.gs4d --cutoff 2", "--cutoff: 2 is not from 1/255 to below 1", "info SCENE.gs4d --cutoff 0.1"),
 ];
 
@@ -126,6 +127,7 @@ fn files() -> TempDir {
     }
     fs::write(&cameras, json.to_string()).expect("the folder can be written to");
     gs4d(&arguments!["convert", &scene, path("runtime.gs4d"), "--form", "runtime"]).text();
+    gs4d(&arguments!["split", &scene, "-o", path("chunks")]).text();
     gs4d(&arguments!["compress", &scene, path("packed.gs4d"), "--codebooks", "4", "--verify", "0"]).text();
     fs::write(path("a.f32"), [0; 4 * 4 * 3 * 4]).expect("the folder can be written to");
     let floaters = "[remove_floaters(cameras_below: 2, distance_below: 0.4)]";

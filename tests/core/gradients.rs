@@ -147,8 +147,9 @@ impl Case {
             ..TrainedWith::default()
         };
         let form = SceneForm::Trained(trained.clone());
-        let (environment, filter, playback, levels, sockets, colliders) = Default::default();
-        let scene = GaussianScene { form, environment, filter, trained_with, playback, levels, sockets, colliders };
+        let (environment, filter, playback, levels, sockets, colliders, chunks) = Default::default();
+        let scene =
+            GaussianScene { form, environment, filter, trained_with, playback, levels, sockets, colliders, chunks };
         scene.into_runtime_with(&self.slice).expect("valid Gaussians")
     }
 

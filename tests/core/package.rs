@@ -11,8 +11,8 @@ use bevy_gs4d::codec::{Loading, ReadOptions};
 use bevy_gs4d::gaussian::{Gaussian, Harmonics, Model, Parameters};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{
-    ColliderMesh, ColliderStretch, Colliders, Environment, Form, GaussianScene, Level, PlaybackHints, RuntimeScene,
-    SceneForm, Sliced, Socket, SocketSample, Trained, TrainedCameras, TrainedWith, UpAxis,
+    ChunkFile, ChunkTable, ColliderMesh, ColliderStretch, Colliders, Environment, Form, GaussianScene, Level,
+    PlaybackHints, RuntimeScene, SceneForm, Sliced, Socket, SocketSample, Trained, TrainedCameras, TrainedWith, UpAxis,
 };
 use bytemuck::{Zeroable, cast_slice};
 use proptest::prelude::*;
@@ -107,6 +107,7 @@ fn scene(shape: &Shape, seed: u64) -> GaussianScene {
         levels: Vec::new(),
         sockets: Vec::new(),
         colliders: None,
+        chunks: None,
     }
 }
 
@@ -612,8 +613,10 @@ fn detailed() -> GaussianScene {
         let shape = Shape { model: None, count, ..SMALL };
         let scene = scene(&shape, 30 + count as u64);
         let SceneForm::Ready(form) = scene.form else { panic!("the runtime form") };
-        let GaussianScene { environment, filter, trained_with, playback, levels, sockets, colliders, .. } = scene;
-        let scene = RuntimeScene { form, environment, filter, trained_with, playback, levels, sockets, colliders };
+        let GaussianScene { environment, filter, trained_with, playback, levels, sockets, colliders, chunks, .. } =
+            scene;
+        let scene =
+            RuntimeScene { form, environment, filter, trained_with, playback, levels, sockets, colliders, chunks };
         Level { pixels, scene: Arc::new(scene) }
     };
     GaussianScene { levels: vec![level(64.0, 2), level(8.0, 1)], ..scene(&SMALL, 31) }
@@ -817,6 +820,66 @@ fn readers_without_colliders_skip_them() {
     assert_same(&scene, &without);
     let plain = GaussianScene { colliders: None, ..scene };
     assert!(!Parts::of(&pack(&plain)).header.contains("collider"), "a package without colliders is as before");
+}
+
+/// Returns the index of a capture in chunk files.
+fn index(files: usize) -> GaussianScene {
+    let file = |number: usize| {
+        let [layer, bytes] = [number % 3, 1_234_567 + number];
+        let stretches = [number / 3, 3_599].map(|stretch| stretch as u32);
+        ChunkFile { stretches, layer: layer as u32, gaussians: 12_345, bytes: bytes as u64 }
+    };
+    let files = (0..files).map(file).collect();
+    let table = ChunkTable { stretches: 3_600, gaussian_bytes: 88, files };
+    let shape = Shape { model: None, count: 0, ..SMALL };
+    GaussianScene { chunks: Some(Arc::new(table)), ..scene(&shape, 35) }
+}
+
+#[test]
+fn the_table_of_an_index_is_read_as_it_was_written() {
+    let scene = index(10_800);
+    let file = pack(&scene);
+    let again = read(&file).expect("readable");
+    assert_eq!(again, scene, "the same table");
+    assert!(file == pack(&again), "writing it again gives the same file");
+    let each = (file.len() - pack(&index(0)).len()) / 10_800;
+    assert!((25..=35).contains(&each), "{each} bytes for each chunk file");
+    let lines = Parts::of(&file).header.lines().filter(|line| line.contains("12345")).count();
+    assert_eq!(lines, 1, "all files are on one line");
+    let info = inspect(&file).expect("readable");
+    assert!(info.is_intact() && info.header.requires.is_empty(), "older readers read an empty scene");
+    let older = read(&Parts::of(&file).swap("    chunks: Some(", "    later: Some(").seal()).expect("readable");
+    assert_eq!(older, GaussianScene { chunks: None, ..scene.clone() }, "an older reader skips the table");
+    assert!(!Parts::of(&pack(&older)).header.contains("chunks"), "a package without chunk files is as before");
+    let runtime = scene.into_runtime().expect("no Gaussian that cannot be drawn");
+    assert_eq!(runtime.chunks, again.chunks, "the scene that is drawn has the table");
+    let mut loading = Loading::new("index.gs4d", file, &ReadOptions::default()).expect("a package");
+    while loading.advance(5_000).expect("readable") {}
+    assert_eq!(loading.finish().expect("the scene can be drawn").chunks, again.chunks, "also if it is read in steps");
+}
+
+#[test]
+fn bad_tables_of_chunk_files_are_neither_read_nor_written() {
+    let good = Parts::of(&pack(&index(2)));
+    for (from, to, expected) in [
+        ("stretches: 3600", "stretches: 0", "stretches"),
+        ("stretches: 3600", "stretches: 3599", "stretches"),
+        ("gaussian_bytes: 88", "gaussian_bytes: 0", "no bytes"),
+        ("(0, 3599, 1, ", "(0, 3599, 16, ", "a layer above 15"),
+        ("(0, 3599, 1, ", "(0, 3599, -1, ", "cannot be understood"),
+    ] {
+        let message = refusal(&good.clone().swap(from, to).seal()).to_string();
+        assert!(message.contains(expected), "{from} as {to}: {message}");
+    }
+    let table = ChunkTable { stretches: 0, gaussian_bytes: 88, files: Vec::new() };
+    let bad = GaussianScene { chunks: Some(Arc::new(table)), ..index(0) };
+    let mut nested = detailed();
+    let level = nested.levels[1].scene.as_ref().clone();
+    nested.levels[1].scene = Arc::new(RuntimeScene { chunks: index(1).chunks, ..level });
+    for (bad, expected) in [(bad, "stretches"), (nested, "in chunk files itself")] {
+        let error = package::write(Vec::new(), &bad, &WriteSettings::default()).expect_err("must be refused");
+        assert!(error.to_string().contains(expected), "{error}");
+    }
 }
 
 #[test]

@@ -75,6 +75,7 @@ fn gradients_match_the_original() {
             levels: Vec::new(),
             sockets: Vec::new(),
             colliders: None,
+            chunks: None,
         };
         let weights = |key: &str| golden::floats(&folder.join(expected[key].as_str().expect("a file")));
         let (color, depth, alpha) = (weights("w_color"), weights("w_depth"), weights("w_alpha"));

@@ -564,6 +564,33 @@ fn a_capture_uploaded_in_chunks_equals_a_capture_uploaded_at_once() {
 }
 
 #[test]
+fn the_bytes_of_a_gaussian_are_known_before_it_is_uploaded() {
+    const COUNT: usize = 5_000;
+    let Some(headless) = gpu::headless() else { return };
+    let GpuContext { device, queue, .. } = headless.context();
+    let renderer = Renderer::new(device, ShaderChecks::On).expect("the passes compile");
+    let bits = packed_scene::scene(COUNT, 3, 1);
+    let RuntimeScene { trained_with, .. } = &bits;
+    // Forty segments are smaller as intervals.
+    let sets = TemporalFilter::support(bits.iter(), trained_with.time_interval, trained_with.marginal_cutoff, 40);
+    let intervals = RuntimeScene { filter: Some(sets), ..bits.clone() };
+    let whole = RuntimeScene { filter: None, ..packed_scene::scene(COUNT, 1, 0) };
+    let (packed, _) = compress(bits.clone(), &packed_scene::settings(&[])).expect("compression succeeds");
+    let packed = packed.into_runtime().expect("drawable");
+    for (form, scene) in [("bits", bits), ("intervals", intervals), ("no filter", whole), ("packed", packed)] {
+        let capture = GpuCapture::upload(device, queue, &renderer, &scene).expect("the scene fits the GPU");
+        let list = scene.filter.as_ref().map_or(0, |filter| {
+            let active = filter.active_counts(0..filter.count).into_iter().max().unwrap_or_default();
+            u64::from(active) * 4
+        });
+        let (own, count) = (capture.bytes() + list, scene.len() as u64);
+        let each = u64::from(GaussianScene::from(scene).gaussian_bytes());
+        assert!(own <= each * count, "{form}: {own} bytes of {count} Gaussians, {each} of each");
+        assert!(each * count < own + 8 * count, "{form}: {each} bytes of each are far more than {own} of all");
+    }
+}
+
+#[test]
 fn a_picture_that_grows_step_by_step_needs_few_new_buffers() {
     let Some(mut headless) = gpu::headless() else { return };
     let scene = scene(500);

@@ -100,7 +100,7 @@ impl CheckpointArgs {
     ///
     /// # Errors
     /// Errors of the codec; options that contradict the training settings in a package, or have no effect on the
-    /// capture.
+    /// capture; the index of a capture in chunk files, which has no Gaussians itself.
     pub(crate) fn load(&self, path: &Path) -> Result<GaussianScene, Failure> {
         self.load_to_play(path, false)
     }
@@ -111,6 +111,26 @@ impl CheckpointArgs {
     /// # Errors
     /// As [`load`](Self::load).
     pub(crate) fn load_to_play(&self, path: &Path, counts_frames: bool) -> Result<GaussianScene, Failure> {
+        let scene = self.open(path, counts_frames)?;
+        match scene.chunks {
+            Some(_) => {
+                let reason = "is the index of a capture in chunk files: gs4d join FOLDER -o CAPTURE makes one file of \
+                              them";
+                Err(Failure::about(path, reason))
+            }
+            None => Ok(scene),
+        }
+    }
+
+    /// Opens a capture to describe it: as [`load`](Self::load), also the index of a capture in chunk files.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load), but for the index.
+    pub(crate) fn load_to_describe(&self, path: &Path) -> Result<GaussianScene, Failure> {
+        self.open(path, false)
+    }
+
+    fn open(&self, path: &Path, counts_frames: bool) -> Result<GaussianScene, Failure> {
         let Imported { scene, lost } = codec::load_stating(path, &self.options()).map_err(of_codec)?;
         self.require_effects(path, &scene, counts_frames)?;
         for sentence in lost {

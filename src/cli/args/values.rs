@@ -4,6 +4,8 @@
 
 use crate::offline::dataset::MAX_SIDE;
 use crate::offline::filter::KeyFrames;
+use crate::offline::segments::LayerShares;
+use crate::scene::ChunkTable;
 use clap::builder::{PossibleValuesParser, RangedU64ValueParser, TypedValueParser};
 use glam::UVec2;
 
@@ -59,6 +61,15 @@ pub(crate) fn seconds(text: &str) -> Result<f32, String> {
 pub(crate) fn share(text: &str) -> Result<f64, String> {
     let share = text.trim().parse::<f64>().ok().filter(|share| (0.0..=1.0).contains(share));
     share.ok_or_else(|| "expected a number from 0 to 1".to_owned())
+}
+
+/// Parses the shares of layers, such as `25,25,50`.
+pub(crate) fn layers(text: &str) -> Result<LayerShares, String> {
+    let shares: Option<Vec<u32>> = text.split(',').map(|share| share.trim().parse().ok()).collect();
+    shares.and_then(LayerShares::new).ok_or_else(|| {
+        let most = ChunkTable::MOST_LAYERS;
+        format!("expected whole percentages, 100 in all, such as 25,25,50, at most {most} of them")
+    })
 }
 
 /// Parses an opacity that something can have: a number above 0 and below 1.
@@ -140,6 +151,7 @@ mod tests {
         assert_eq!(size("1352x1014"), Ok(UVec2::new(1352, 1014)), "a size");
         assert_eq!(corners("-1,-2,-3, 1,2,3"), Ok([[-1.0, -2.0, -3.0], [1.0, 2.0, 3.0]]), "a box");
         assert_eq!(opacity("0.5"), Ok(0.5), "an opacity");
+        assert_eq!(layers("25, 25,50"), Ok(LayerShares::default()), "three layers");
     }
 
     #[test]
@@ -158,6 +170,9 @@ mod tests {
         }
         for text in ["", "0,0,0", "1,0,0,0,1,1", "0,0,0,1,1,0", "0,0,0,1,1,nan", "0,0,0,1,1,inf", "0,0,0,1,1,1,1"] {
             assert!(corners(text).is_err(), "{text:?} is no box");
+        }
+        for text in ["", "50", "0,100", "50,60", "33.3,66.7", "25,25,50,", "-50,150"] {
+            assert!(layers(text).is_err(), "{text:?} are no shares of layers");
         }
         assert!(not_negative("-1").is_err() && not_negative("inf").is_err(), "finite and not below zero");
         assert!(not_negative("1e6").is_ok() && not_negative("1e308").is_err(), "at most the largest value");

@@ -191,6 +191,7 @@ fn of_segments(error: &AnyError) -> Option<String> {
         SegmentsError::Still { .. } => " (gs4d convert --duration)",
         SegmentsError::Overlap { .. } => "; without --keep-times, it begins then",
         SegmentsError::Speed { .. } => "; without --keep-times, it is stretched",
+        SegmentsError::ManyChunks { .. } => ": give a longer --chunk, or fewer --layers",
         _ => return None,
     };
     Some(remedy.to_owned())
@@ -248,7 +249,7 @@ mod tests {
     fn the_remedy_follows_the_message_of_the_error() {
         let folder = || PathBuf::from("out.bake");
         let frame = FrameProblem::NoTime("a.png".to_owned());
-        let errors: [(Box<dyn Error>, &str); 9] = [
+        let errors: [(Box<dyn Error>, &str); 10] = [
             (TrainError::WithoutGpu.into(), "needs a GPU; --engine gpu takes one with a software driver, slowly"),
             (FootageError::from(TrainError::WithoutGpu).into(), "needs a GPU; without --rehearse nothing is trained"),
             (FormError::NotTrained.into(), "to the trained form: convert the checkpoint with --form trained"),
@@ -269,6 +270,10 @@ mod tests {
             (
                 TrainError::Start { path: folder(), reason: StartError::NoSilhouettes }.into(),
                 "so that they have no hull: give --start random",
+            ),
+            (
+                SegmentsError::ManyChunks { path: folder(), found: 100_000 }.into(),
+                "100000 chunk files, more than 99999: give a longer --chunk, or fewer --layers",
             ),
         ];
         for (error, end) in errors {

@@ -15,7 +15,9 @@ use crate::gaussian::Model;
 use crate::offline::dataset::{CameraOptions, Dataset};
 use crate::offline::forms::convert::form_name;
 use crate::scene::packed::MAX_STAGES;
-use crate::scene::{Bounds, ColorDegrees, GaussianScene, Level, PlaybackHints, SceneForm, Socket, TrainedWith};
+use crate::scene::{
+    Bounds, ChunkTable, ColorDegrees, GaussianScene, Level, PlaybackHints, SceneForm, Socket, TrainedWith,
+};
 use glam::Vec3;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -65,6 +67,8 @@ struct Facts {
     levels: Vec<LevelFacts>,
     sockets: Vec<SocketFacts>,
     colliders: Option<ColliderFacts>,
+    /// Of the index of a capture in chunk files.
+    chunks: Option<ChunkFacts>,
 }
 
 /// A level of detail, without its Gaussians.
@@ -93,6 +97,18 @@ struct ColliderFacts {
     /// Numbers of points and triangles of all meshes.
     points: usize,
     triangles: usize,
+}
+
+/// The chunk files of a capture, all together.
+#[derive(Serialize)]
+struct ChunkFacts {
+    files: usize,
+    /// Number of stretches of time.
+    stretches: u32,
+    layers: u32,
+    gaussians: u64,
+    /// The length of all files.
+    bytes: u64,
 }
 
 /// Bounds of the Gaussians, capture units.
@@ -124,7 +140,7 @@ impl Info {
             let failure = Failure::about(&self.file, &message);
             return Ok(self.report(size, format, &Facts::of_package(info), package.as_ref(), None, Some(failure)));
         }
-        let scene = self.checkpoint.load(&self.file)?;
+        let scene = self.checkpoint.load_to_describe(&self.file)?;
         let facts = Facts::of_scene(&scene);
         let (extent, failure) = match scene.into_runtime() {
             Ok(scene) => {
@@ -154,7 +170,9 @@ impl Info {
         if let Some(shares) = package.and_then(shares_of_layers) {
             pairs.push(("drawn coarsely", format!("after {shares} of the file")));
         }
-        let rate = bit_rate(size, &facts.playback);
+        // An index is played with its chunk files.
+        let chunks = facts.chunks.as_ref().map_or(0, |chunks| chunks.bytes);
+        let rate = bit_rate(size.saturating_add(chunks), &facts.playback);
         if let Some(rate) = rate {
             pairs.push(("bit rate", format!("{rate:.1} Mbit/s")));
         }
@@ -181,6 +199,7 @@ impl Info {
             "levels": facts.levels,
             "sockets": facts.sockets,
             "colliders": facts.colliders,
+            "chunks": facts.chunks,
             "megabits_per_second": rate,
             "bounds": extent.as_ref().map(|extent| box_json(&extent.all)),
             "core": extent.as_ref().map(|extent| box_json(&extent.core)),
@@ -200,7 +219,8 @@ impl Facts {
         Self {
             gaussians: scene.len(),
             form: form_name(&scene.form),
-            model: scene.model(),
+            // Without Gaussians a scene does not have the model of its chunk files.
+            model: scene.model().filter(|_| scene.chunks.is_none()),
             color: scene.form.color_degrees(),
             codebooks: coded.map(|colors| colors.entries.clone()),
             environment: scene.environment.as_ref().map(|map| [map.width, map.height]),
@@ -212,6 +232,7 @@ impl Facts {
                 let meshes = colliders.meshes().map(|mesh| [mesh.points.len(), mesh.triangles.len()]);
                 ColliderFacts::of_meshes(colliders.stretches.len(), meshes)
             }),
+            chunks: scene.chunks.as_deref().map(ChunkFacts::of),
         }
     }
 
@@ -226,7 +247,7 @@ impl Facts {
         Self {
             gaussians: header.gaussians,
             form: header.form.name(),
-            model,
+            model: model.filter(|_| header.chunks.is_none()),
             color: ColorDegrees { coefficients: header.coefficients, degree: header.degree, degree_t: header.degree_t },
             codebooks: codebooks.map(used),
             environment: header.environment.map(|map| [map.width, map.height]),
@@ -243,6 +264,7 @@ impl Facts {
                 let meshes = iter::once(&colliders.standing).chain(moving).map(|mesh| [mesh.points, mesh.triangles]);
                 ColliderFacts::of_meshes(colliders.stretches.len(), meshes)
             }),
+            chunks: header.chunks.as_ref().map(ChunkFacts::of),
         }
     }
 
@@ -277,6 +299,11 @@ impl Facts {
             let what = format!("{points} points, {triangles} triangles, {stretches} stretches of time");
             pairs.push(("colliders", what));
         }
+        if let Some(ChunkFacts { files, stretches, layers, gaussians, bytes: length }) = &self.chunks {
+            let length = bytes(*length);
+            let of = format!("{gaussians} Gaussians in {layers} layers over {stretches} stretches of time, {length}");
+            pairs.push(("chunks", format!("the index of {files} chunk files: {of}")));
+        }
         pairs
     }
 }
@@ -305,6 +332,18 @@ impl ColliderFacts {
     }
 }
 
+impl ChunkFacts {
+    fn of(table: &ChunkTable) -> Self {
+        Self {
+            files: table.files.len(),
+            stretches: table.stretches,
+            layers: table.layers(),
+            gaussians: table.files.iter().map(|file| file.gaussians).sum(),
+            bytes: table.files.iter().map(|file| file.bytes).sum(),
+        }
+    }
+}
+
 impl fmt::Display for LevelFacts {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.gaussians {
@@ -330,8 +369,8 @@ fn shares_of_layers(info: &PackageInfo) -> Option<String> {
     (!shares.is_empty()).then(|| shares.join(", "))
 }
 
-/// Returns the bit rate of a link that brings a file during one pass, Mbit/s; `None` for a still.
-fn bit_rate(size: u64, playback: &PlaybackHints) -> Option<f64> {
+/// Returns the bit rate of a link that brings some bytes during one pass, Mbit/s; `None` for a still.
+pub(super) fn bit_rate(size: u64, playback: &PlaybackHints) -> Option<f64> {
     let seconds = playback.duration_seconds;
     (seconds > 0.0).then(|| size as f64 * 8e-6 / f64::from(seconds))
 }

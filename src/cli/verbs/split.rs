@@ -1,15 +1,18 @@
 //! `gs4d split IN -o FOLDER`: cuts a capture into chunk files.
 //!
-//! In: a capture, the length of a stretch of time. Out: a folder with a package for each run of Gaussians that are alive
-//! in the same stretches; a report of the times and the size of each.
+//! In: a capture, the length of a stretch of time, the shares of its layers. Out: a folder with a package for each layer
+//! of each run of Gaussians that are alive in the same stretches, and an index of them; a report of the times and the
+//! size of each, and of the bit rates of layers.
 
+use super::info::bit_rate;
 use crate::cli::args::{CheckpointArgs, file_size, values};
 use crate::cli::output::failure::Failure;
 use crate::cli::output::progress::Bars;
 use crate::cli::output::report::Report;
 use crate::cli::output::table::{Table, bytes, lines};
-use crate::offline::segments::{Chunk, MOST_CHUNKS, Segment, Split, other_chunk};
+use crate::offline::segments::{Chunk, Chunks, LayerShares, Segment, Split, other_chunk};
 use crate::offline::store::outputs::Files;
+use crate::scene::ChunkTable;
 use serde_json::{Value, json};
 use std::fs;
 use std::path::PathBuf;
@@ -17,17 +20,20 @@ use std::path::PathBuf;
 /// Cut a capture into chunk files by the stretches of time in which its Gaussians are alive.
 ///
 /// Each Gaussian is in one file. A file covers 1, 2, 4, ... stretches of time that follow one another: Gaussians that
-/// live for a moment are in files of one stretch, those that are always there in a file of all. Each file is a package
-/// with the clock of the whole capture. gs4d join puts them together again.
+/// live for a moment are in files of one stretch, those that are always there in files of all. The Gaussians of the same
+/// stretches are in layers, the most important first. Each file is a package with the clock of the whole capture. An
+/// index, index.gs4d, lists the files: a player loads the index, and then the files that it needs at a time. gs4d join
+/// puts the files together again.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
   gs4d split long.gs4d -o chunks
-  gs4d split long.gs4d -o chunks --chunk 0.5 --json
+  gs4d split long.gs4d -o chunks --chunk 0.5 --layers 20,30,50 --json
   gs4d join chunks -o long.gs4d
 
 The pictures of the joined chunks are those of IN. Its Gaussians are in the order of the chunks; split and joined once more, the files are the
-same byte for byte. Runs of fewer than 256 Gaussians become part of longer ones. Packed captures would be rounded twice: split lossless ones.")]
+same byte for byte. Runs of fewer than 256 Gaussians become part of longer ones, and such layers of others. Packed captures would be rounded
+twice: split lossless ones.")]
 pub(crate) struct SplitVerb {
     /// The checkpoint or package to read, not packed.
     #[arg(value_name = "IN")]
@@ -38,30 +44,35 @@ pub(crate) struct SplitVerb {
     /// Length of a stretch of time at speed 1, seconds.
     #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = values::positive)]
     chunk: f32,
+    /// Shares of the Gaussians in layers, percent, the most important first; 100: one layer.
+    #[arg(long, value_name = "PERCENT,..", default_value = "25,25,50", value_parser = values::layers)]
+    layers: LayerShares,
     /// zstd level, 1 (fast) to 19 (small) [default: 9].
     #[arg(long, value_name = "LEVEL", value_parser = clap::value_parser!(i32).range(1..=19))]
     level: Option<i32>,
 }
 
 impl SplitVerb {
-    /// Cuts the capture and writes the chunk files.
+    /// Cuts the capture and writes the chunk files and their index.
     ///
     /// # Errors
     /// A capture that cannot be read or is packed, chunks of another capture in the folder, files that cannot be written.
     pub(crate) fn run(&self) -> Result<Report, Failure> {
         let files = Files::default().reads_scene(&self.input);
+        let index = self.out.join(ChunkTable::INDEX);
         // A wrong path is reported before the capture is read.
-        files.clone().writes_folder(&self.out, []).check()?;
+        files.clone().writes_folder(&self.out, [index.clone()]).check()?;
         let scene = CheckpointArgs::default().load_to_change(&self.input)?;
         let segment = Segment { path: self.input.clone(), scene };
-        let split = Split::of(&segment, self.stretches(segment.scene.playback.duration_seconds)?)?;
+        let stretches = self.stretches(segment.scene.playback.duration_seconds)?;
+        let split = Split::of(&segment, stretches, &self.layers)?;
         let paths = split.paths(&self.out);
         if let Some(other) = other_chunk(&self.out, &paths) {
             let reason = "is a chunk of another split, which would be read with this one: remove it, or write to another \
                           folder";
             return Err(Failure::about(&other, reason));
         }
-        files.writes_folder(&self.out, paths).check()?;
+        files.writes_folder(&self.out, paths.into_iter().chain([index])).check()?;
         fs::create_dir_all(&self.out).map_err(|error| Failure::at(&self.out, &error))?;
         let chunks = split.write(&segment, &self.out, self.level, &mut Bars::default())?;
         self.report(&segment, &chunks)
@@ -70,38 +81,66 @@ impl SplitVerb {
     /// Returns the number of stretches of time of a capture that plays for `seconds`.
     fn stretches(&self, seconds: f32) -> Result<u32, Failure> {
         let count = (f64::from(seconds) / f64::from(self.chunk)).ceil().max(1.0);
-        if count > f64::from(MOST_CHUNKS) {
-            let many = format!("{count} stretches of time are more than {MOST_CHUNKS}");
+        let most = ChunkTable::MOST_STRETCHES;
+        if count > f64::from(most) {
+            let many = format!("{count} stretches of time are more than {most}");
             return Err(Failure::about(&self.input, &format!("--chunk {}: {many}: give a longer one", self.chunk)));
         }
         Ok(count as u32)
     }
 
-    fn report(&self, segment: &Segment, chunks: &[Chunk]) -> Result<Report, Failure> {
-        let sizes = chunks.iter().map(|chunk| file_size(&chunk.path)).collect::<Result<Vec<u64>, Failure>>()?;
-        let (before, total) = (file_size(&self.input)?, sizes.iter().sum::<u64>());
-        let mut table = Table::new(&["chunk", "from", "to", "Gaussians", "size"]);
-        let mut listed: Vec<Value> = Vec::with_capacity(chunks.len());
-        for (Chunk { path, times, gaussians }, size) in chunks.iter().zip(&sizes) {
+    fn report(&self, segment: &Segment, chunks: &Chunks) -> Result<Report, Failure> {
+        let Chunks { index, table, files } = chunks;
+        let (before, of_index) = (file_size(&self.input)?, file_size(index)?);
+        let total = table.files.iter().map(|file| file.bytes).sum::<u64>() + of_index;
+        let mut rows = Table::new(&["chunk", "layer", "from", "to", "Gaussians", "size"]);
+        let mut listed: Vec<Value> = Vec::with_capacity(files.len());
+        for Chunk { path, times, file } in files {
             let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            let [from, to] = *times;
-            table.row([name, from.to_string(), to.to_string(), gaussians.to_string(), bytes(*size)]);
-            let path = path.display().to_string();
-            listed.push(json!({ "file": path, "times": times, "gaussians": gaussians, "bytes": size }));
+            let [from, to] = times.map(|time| time.to_string());
+            rows.row([name, file.layer.to_string(), from, to, file.gaussians.to_string(), bytes(file.bytes)]);
+            listed.push(json!({
+                "file": path.display().to_string(),
+                "layer": file.layer,
+                "stretches": file.stretches,
+                "times": times,
+                "gaussians": file.gaussians,
+                "bytes": file.bytes,
+            }));
         }
-        let facts = lines(&[
+        // The index is needed with any of the layers.
+        let playback = &segment.scene.playback;
+        let rate = |layer: u32| bit_rate(of_index + table.bytes_up_to(layer), playback);
+        let rates: Vec<f64> = (0..table.layers()).filter_map(rate).collect();
+        let first = of_index + table.bytes_at(0, 0);
+        let mut facts = vec![
             ("Gaussians", segment.scene.len().to_string()),
             ("read", bytes(before)),
-            ("wrote", format!("{}, {} files, {}", self.out.display(), chunks.len(), bytes(total))),
-        ]);
+            ("wrote", format!("{}, {} files and the index, {}", self.out.display(), files.len(), bytes(total))),
+            ("index", format!("{}, {}", index.display(), bytes(of_index))),
+            ("first picture", format!("after {}: the index, and layer 0 of the first stretch", bytes(first))),
+        ];
+        if !rates.is_empty() {
+            let up_to = |(layer, rate): (usize, &f64)| match layer {
+                0 => format!("{rate:.1} Mbit/s for layer 0"),
+                _ => format!("{rate:.1} up to layer {layer}"),
+            };
+            let rates: Vec<String> = rates.iter().enumerate().map(up_to).collect();
+            facts.push(("bit rate", rates.join(", ")));
+        }
         let json = json!({
             "in": self.input.display().to_string(),
             "out": self.out.display().to_string(),
             "bytes_in": before,
             "bytes_out": total,
             "gaussians": segment.scene.len(),
+            "stretches": table.stretches,
+            "layers": table.layers(),
+            "index": { "file": index.display().to_string(), "bytes": of_index },
+            "first_picture_bytes": first,
+            "megabits_per_second": rates,
             "chunks": listed,
         });
-        Ok(Report::new(json, format!("{table}\n{facts}")))
+        Ok(Report::new(json, format!("{rows}\n{}", lines(&facts))))
     }
 }

@@ -21,6 +21,9 @@ pub(crate) fn of(scene: &GaussianScene, format: &Export) -> Vec<String> {
     if scene.colliders.is_some() {
         lost.push("The colliders are not exported.".to_owned());
     }
+    if let Some(chunks) = &scene.chunks {
+        lost.push(format!("The Gaussians in {} chunk files are not exported.", chunks.files.len()));
+    }
     if scene.trained_with.uses_fov_sentinel() {
         lost.push(
             "The footprints of this capture were shaped by a wider field of view, which other players do not have: their footprints differ \

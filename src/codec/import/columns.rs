@@ -98,6 +98,7 @@ impl Played {
             levels: Vec::new(),
             sockets: Vec::new(),
             colliders: None,
+            chunks: None,
         };
         scene.check().map_err(ImportError::damaged)?;
         Ok(scene)

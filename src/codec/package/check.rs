@@ -12,7 +12,7 @@ use crate::gaussian::SMALLEST_CUTOFF;
 use crate::gaussian::harmonics::{MAX_COEFFICIENTS, evaluated};
 use crate::scene::detail::check_sizes;
 use crate::scene::packed::{MAX_ENTRIES, are_layers};
-use crate::scene::{GaussianScene, MAX_LEVELS, MAX_SEGMENTS, SceneForm, Trained, check_sockets};
+use crate::scene::{ChunkTable, GaussianScene, MAX_LEVELS, MAX_SEGMENTS, SceneForm, Trained, check_sockets};
 
 /// Uncompressed bytes that a package of any length may hold.
 const RAW_FLOOR: u64 = 64 << 20;
@@ -143,6 +143,7 @@ impl Header {
         check_sizes(self.levels.iter().map(|level| level.pixels)).map_err(PackageError::Inconsistent)?;
         check_sockets(&self.sockets).map_err(PackageError::Inconsistent)?;
         self.colliders.as_ref().map_or(Ok(()), StoredColliders::check).map_err(PackageError::Inconsistent)?;
+        self.chunks.as_ref().map_or(Ok(()), ChunkTable::check).map_err(PackageError::Inconsistent)?;
         let duration = self.playback.duration_seconds;
         sane(duration.is_finite() && duration >= 0.0, "the playback duration must be a finite number, zero or above")
     }

@@ -10,8 +10,8 @@ use super::section::Section;
 use crate::gaussian::{Gaussian, MARGINAL_CUTOFF, Model};
 use crate::scene::packed::{COLOR_WORDS, MAX_STAGES, RECORD_WORDS};
 use crate::scene::{
-    ActiveSets, ColorDegrees, FilterKind, Form, GaussianScene, PackedColors, PackedScene, PlaybackHints, SceneForm,
-    Socket, TemporalFilter, Trained, TrainedWith,
+    ActiveSets, ChunkTable, ColorDegrees, FilterKind, Form, GaussianScene, PackedColors, PackedScene, PlaybackHints,
+    SceneForm, Socket, TemporalFilter, Trained, TrainedWith,
 };
 use crate::view::NEAR;
 use serde::{Deserialize, Serialize};
@@ -57,6 +57,10 @@ pub struct Header {
     /// Meshes of the solid parts, without their points and triangles. Levels of detail have none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub colliders: Option<StoredColliders>,
+    /// The chunk files that have the Gaussians, if the package is the index of a capture in chunk files. Levels of detail
+    /// have none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub chunks: Option<ChunkTable>,
     /// The section table, in the order of the file.
     pub sections: Vec<Section>,
 }
@@ -182,6 +186,7 @@ impl Header {
             levels: scene.levels.iter().map(|level| StoredLevel { pixels: level.pixels }).collect(),
             sockets: scene.sockets.clone(),
             colliders: scene.colliders.as_deref().map(StoredColliders::of),
+            chunks: scene.chunks.as_deref().cloned(),
             sections: Vec::new(),
         }
     }

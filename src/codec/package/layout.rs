@@ -11,6 +11,7 @@ use crate::scene::{
     TemporalFilter, Trained,
 };
 use bytemuck::{Zeroable, cast_slice, cast_slice_mut};
+use std::sync::Arc;
 
 /// Returns a scene of the header's form without values, which [`grow`] adds, and without colliders. The header must
 /// have been checked.
@@ -55,6 +56,7 @@ pub(super) fn empty(header: &Header) -> GaussianScene {
         levels: Vec::new(),
         sockets: header.sockets.clone(),
         colliders: None,
+        chunks: header.chunks.clone().map(Arc::new),
     }
 }
 

@@ -8,8 +8,8 @@
 use std::collections::BTreeMap;
 use std::ops::Bound;
 
-/// Runs of fewer Gaussians become part of a longer run: a file costs more than they do.
-const LEAST: usize = 256;
+/// Runs and layers of fewer Gaussians become part of others: a file costs more than they do.
+pub(super) const LEAST: usize = 256;
 
 /// The Gaussians of some chunks that follow one another.
 #[derive(Debug, Clone, PartialEq, Eq)]

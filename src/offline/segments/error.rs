@@ -5,6 +5,7 @@
 
 use crate::codec::CodecError;
 use crate::offline::work::{FileError, Interrupted};
+use crate::scene::ChunkTable;
 use std::path::PathBuf;
 
 /// What all segments of a capture must have in common.
@@ -127,6 +128,14 @@ pub enum SegmentsError {
     Scattered {
         /// The segment.
         path: PathBuf,
+    },
+    /// A capture that would be cut into more chunk files than an index may have.
+    #[error("{}: would be cut into {found} chunk files, more than {}", .path.display(), ChunkTable::MOST_FILES)]
+    ManyChunks {
+        /// The capture.
+        path: PathBuf,
+        /// Number of chunk files.
+        found: usize,
     },
     /// A chunk that is not there.
     #[error("{}: its chunk {name} is missing: all chunks of a capture are needed", .folder.display())]

@@ -1,10 +1,11 @@
-//! The names of chunk files.
+//! Chunk files are known by their names.
 //!
-//! In: paths that a person names. Out: the segments among them: a file each, or the chunks of one capture, which are
-//! known by their names, whether their folder is named or each of them.
+//! In: paths that a person names. Out: the segments among them: a file each, or the chunks of one capture, whether their
+//! folder is named or each of them. The index beside them is no segment.
 
 use super::error::SegmentsError;
 use crate::offline::work::FileError;
+use crate::scene::ChunkTable;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -19,12 +20,8 @@ pub struct Source {
     pub is_split: bool,
 }
 
-/// Returns the name of a chunk file. `number` counts from 0.
-pub(super) fn chunk_name(number: usize, of: usize) -> String {
-    format!("chunk-{:05}-of-{of:05}.gs4d", number + 1)
-}
-
-/// Returns the number of a chunk file, from 0, and the number of chunks; `None` for another file.
+/// Returns the number of a chunk file, from 0, and the number of chunks; `None` for a file of another name than
+/// [`ChunkTable::file_name`] returns.
 pub(super) fn chunk_number(path: &Path) -> Option<(usize, usize)> {
     let name = path.file_name()?.to_str()?.strip_prefix("chunk-")?.strip_suffix(".gs4d")?;
     // A number may begin with a sign when it is parsed.
@@ -40,7 +37,7 @@ pub(super) fn chunk_number(path: &Path) -> Option<(usize, usize)> {
 /// Chunks that are missing or are of two captures, a folder that cannot be listed.
 pub fn sources(paths: &[PathBuf]) -> Result<Vec<Source>, SegmentsError> {
     let (mut sources, mut seen) = (Vec::<Source>::new(), BTreeSet::new());
-    for path in paths {
+    for path in paths.iter().filter(|path| !is_index_of(path, paths)) {
         let chunks = if path.is_dir() { chunks_in(path)? } else { Vec::new() };
         let folder = match chunk_number(path) {
             _ if !chunks.is_empty() => path.clone(),
@@ -66,6 +63,12 @@ pub fn sources(paths: &[PathBuf]) -> Result<Vec<Source>, SegmentsError> {
     Ok(sources)
 }
 
+/// Returns whether a path is the index beside chunks that are named, too, as by `chunks/*`.
+fn is_index_of(path: &Path, paths: &[PathBuf]) -> bool {
+    let is_beside = |other: &PathBuf| chunk_number(other).is_some() && other.parent() == path.parent();
+    path.file_name().is_some_and(|name| name == ChunkTable::INDEX) && paths.iter().any(is_beside)
+}
+
 /// Returns the chunk files in a folder.
 pub(super) fn chunks_in(folder: &Path) -> Result<Vec<PathBuf>, SegmentsError> {
     let entries = folder.read_dir().map_err(|error| FileError::at(folder, error))?;
@@ -83,7 +86,7 @@ fn check_complete(source: &Source) -> Result<(), SegmentsError> {
     }
     let missing = (0..of).find(|number| numbers.get(*number) != Some(&(*number, of)));
     missing.map_or(Ok(()), |number| {
-        Err(SegmentsError::Missing { folder: source.path.clone(), name: chunk_name(number, of) })
+        Err(SegmentsError::Missing { folder: source.path.clone(), name: ChunkTable::file_name(number, of) })
     })
 }
 
@@ -98,8 +101,10 @@ mod tests {
 
     #[test]
     fn chunks_are_known_by_their_names() {
-        assert_eq!(chunk_name(0, 12), "chunk-00001-of-00012.gs4d", "numbers begin at 1");
-        assert_eq!(chunk_number(Path::new("a/chunk-00012-of-00012.gs4d")), Some((11, 12)), "the last");
+        let last = Path::new("a").join(ChunkTable::file_name(11, 12));
+        assert_eq!(last, Path::new("a/chunk-00012-of-00012.gs4d"), "numbers begin at 1");
+        assert_eq!(chunk_number(&last), Some((11, 12)), "the last");
+        assert_eq!(chunk_number(Path::new(ChunkTable::INDEX)), None, "the index is no chunk");
         for name in ["chunk-13-of-12.gs4d", "chunk-0-of-3.gs4d", "chunk-+1-of-3.gs4d", "chunk-1-of-2.ply", "a.gs4d"] {
             assert_eq!(chunk_number(Path::new(name)), None, "{name} is no chunk");
         }
@@ -108,9 +113,10 @@ mod tests {
     #[test]
     fn a_folder_and_its_files_are_one_capture() {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let names: Vec<String> = (0..3).map(|number| chunk_name(number, 3)).collect();
+        let names: Vec<String> = (0..3).map(|number| ChunkTable::file_name(number, 3)).collect();
         let chunks = at(folder.path(), &names);
-        for path in chunks.iter().chain([&folder.path().join("notes.txt")]) {
+        let index = folder.path().join(ChunkTable::INDEX);
+        for path in chunks.iter().chain([&index, &folder.path().join("notes.txt")]) {
             fs::write(path, b"").expect("the folder can be written to");
         }
         let expected = Source { path: folder.path().to_owned(), files: chunks.clone(), is_split: true };
@@ -121,12 +127,16 @@ mod tests {
         let by_files = sources(&backwards).expect("all chunks are named");
         assert_eq!((by_files.len(), &by_files[1]), (2, &expected), "each file, in the order of their numbers");
         assert!(!by_files[0].is_split && by_files[0].files == [first], "another file");
+        let all: Vec<PathBuf> = chunks.iter().cloned().chain([index.clone()]).collect();
+        assert_eq!(sources(&all).ok(), Some(vec![expected]), "the index beside them is left out");
+        let alone = sources(std::slice::from_ref(&index)).expect("a file");
+        assert!(!alone[0].is_split, "the index alone is a file as any other");
 
         let missing = sources(&[chunks[0].clone(), chunks[2].clone()]).expect_err("one is missing").to_string();
         assert!(missing.contains("chunk-00002-of-00003.gs4d is missing"), "by name: {missing}");
         let twice = sources(&[folder.path().to_owned(), chunks[1].clone()]);
         assert!(matches!(twice, Err(SegmentsError::Mixed { path }) if path == chunks[1]), "named twice");
-        fs::write(folder.path().join(chunk_name(0, 2)), b"").expect("the folder can be written to");
+        fs::write(folder.path().join(ChunkTable::file_name(0, 2)), b"").expect("the folder can be written to");
         let mixed = sources(&[folder.path().to_owned()]);
         assert!(matches!(mixed, Err(SegmentsError::Mixed { .. })), "chunks of two captures");
     }

@@ -13,7 +13,8 @@
 //! | `join` | one capture of segments |
 //! | `files` | the names of chunk files, and which paths are chunks of one capture |
 //! | `covers` | runs: the Gaussians of a stretch of chunks |
-//! | `split` | chunk files of a capture |
+//! | `layers` | the Gaussians of a run by importance |
+//! | `split` | chunk files of a capture, and their index |
 //! | `unite` | the capture of chunks |
 
 mod alike;
@@ -23,6 +24,7 @@ mod error;
 mod files;
 mod forms;
 mod join;
+mod layers;
 mod segment;
 mod split;
 mod unite;
@@ -31,6 +33,7 @@ mod windows;
 pub use error::{SegmentsError, Shared};
 pub use files::{Source, sources};
 pub use join::{Joined, JoinedSegment, Times, join};
+pub use layers::LayerShares;
 pub use segment::Segment;
-pub use split::{Chunk, MOST_CHUNKS, Split, other_chunk};
+pub use split::{Chunk, Chunks, Split, other_chunk};
 pub use unite::unite;

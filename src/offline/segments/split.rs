@@ -1,20 +1,24 @@
 //! A capture as chunk files.
 //!
-//! In: a capture, a number of stretches of time. Out: a file for each run of Gaussians: a capture with the clock of the
-//! whole, of which any player shows what it has. Together they are the whole capture: see `unite`.
+//! In: a capture, a number of stretches of time, the shares of its layers. Out: a file for each layer of each run of
+//! Gaussians: a capture with the clock of the whole, of which any player shows what it has. Together they are the whole
+//! capture: see `unite`. The index beside them has everything but the Gaussians, and the table of the files.
 
-use super::covers::{Run, runs};
+use super::covers::runs;
 use super::error::SegmentsError;
-use super::files::{chunk_name, chunks_in};
+use super::files::chunks_in;
+use super::layers::{LayerShares, layers};
 use super::segment::Segment;
 use super::windows::{hulls, intervals};
+use crate::gaussian::Gaussian;
 use crate::offline::prune::select::select;
-use crate::offline::work::{Progress, proceed, save, write_settings};
-use crate::scene::TemporalFilter;
+use crate::offline::work::{FileError, Progress, proceed, save, write_settings};
+use crate::scene::{ChunkFile, ChunkTable, GaussianScene, TemporalFilter};
+use rayon::prelude::*;
+use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
-
-/// Most stretches of time of a capture.
-pub const MOST_CHUNKS: u32 = 10_000;
+use std::sync::Arc;
 
 /// A chunk file.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,37 +27,74 @@ pub struct Chunk {
     pub path: PathBuf,
     /// The times between which its Gaussians are alive, timestamp units.
     pub times: [f64; 2],
-    /// Number of Gaussians.
-    pub gaussians: usize,
+    /// Its layer, number of Gaussians and length.
+    pub file: ChunkFile,
+}
+
+/// The files of a capture that has been cut.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Chunks {
+    /// The index.
+    pub index: PathBuf,
+    /// The table of the index.
+    pub table: ChunkTable,
+    /// The chunk files, in the order of the table.
+    pub files: Vec<Chunk>,
+}
+
+/// The Gaussians of a chunk file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Part {
+    /// The first and the last stretch of time.
+    stretches: [u32; 2],
+    layer: u32,
+    /// Their indices, ascending.
+    gaussians: Vec<u32>,
 }
 
 /// A capture cut into chunks that are not yet written.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Split {
-    runs: Vec<Run>,
+    /// By first stretch, the shorter before the longer; those of the same stretches by layer.
+    parts: Vec<Part>,
     /// Number of stretches of time.
     stretches: u32,
 }
 
 impl Split {
-    /// Cuts a capture into `stretches` stretches of time, 1 to [`MOST_CHUNKS`].
+    /// Cuts a capture into `stretches` stretches of time, 1 to [`ChunkTable::MOST_STRETCHES`], and the Gaussians of each
+    /// run of stretches into layers.
     ///
     /// # Errors
-    /// A packed capture, a Gaussian that cannot be drawn.
-    pub fn of(segment: &Segment, stretches: u32) -> Result<Self, SegmentsError> {
+    /// A packed capture, a Gaussian that cannot be drawn, more than [`ChunkTable::MOST_FILES`] files.
+    pub fn of(segment: &Segment, stretches: u32, shares: &LayerShares) -> Result<Self, SegmentsError> {
         segment.require_unpacked()?;
-        let stretches = stretches.clamp(1, MOST_CHUNKS);
-        Ok(Self { runs: runs(lives(segment, stretches)?.into_iter(), stretches), stretches })
+        let stretches = stretches.clamp(1, ChunkTable::MOST_STRETCHES);
+        let gaussians = segment.scene.gaussians().map_err(|error| segment.at(error))?;
+        let importances: Vec<f32> = gaussians.par_iter().map(importance).collect();
+        let runs = runs(lives(&segment.scene, &gaussians, stretches).into_iter(), stretches);
+        drop(gaussians);
+        let parts: Vec<Part> = runs
+            .into_iter()
+            .flat_map(|run| {
+                let part = move |(layer, gaussians)| Part { stretches: run.chunks, layer, gaussians };
+                (0..).zip(layers(&run.gaussians, &importances, shares)).map(part)
+            })
+            .collect();
+        match parts.len() > ChunkTable::MOST_FILES {
+            true => Err(SegmentsError::ManyChunks { path: segment.path.clone(), found: parts.len() }),
+            false => Ok(Self { parts, stretches }),
+        }
     }
 
-    /// Returns the files that it will be in.
+    /// Returns the chunk files that it will be in. The index [`ChunkTable::INDEX`] is written beside them.
     pub fn paths(&self, folder: &Path) -> Vec<PathBuf> {
-        let count = self.runs.len();
-        (0..count).map(|number| folder.join(chunk_name(number, count))).collect()
+        let count = self.parts.len();
+        (0..count).map(|number| folder.join(ChunkTable::file_name(number, count))).collect()
     }
 
-    /// Writes the chunk files of the capture into a folder, which exists. `level` is the zstd level, `None` the usual
-    /// one. Begins the task "writing".
+    /// Writes the chunk files of the capture into a folder, which exists, and then their index: where it is, all files
+    /// are complete. `level` is the zstd level, `None` the usual one. Begins the task "writing".
     ///
     /// # Errors
     /// Files that cannot be written, an interruption.
@@ -63,45 +104,70 @@ impl Split {
         folder: &Path,
         level: Option<i32>,
         progress: &mut dyn Progress,
-    ) -> Result<Vec<Chunk>, SegmentsError> {
-        progress.begin("writing", self.runs.len());
-        let mut chunks = Vec::with_capacity(self.runs.len());
-        for (run, path) in self.runs.iter().zip(self.paths(folder)) {
+    ) -> Result<Chunks, SegmentsError> {
+        progress.begin("writing", self.parts.len() + 1);
+        let (index, settings) = (folder.join(ChunkTable::INDEX), write_settings(&segment.scene.form, level));
+        remove_index(&index)?;
+        let mut files = Vec::with_capacity(self.parts.len());
+        for (part, path) in self.parts.iter().zip(self.paths(folder)) {
             proceed(progress)?;
-            let mut scene = select(&segment.scene, &run.gaussians);
+            let mut scene = select(&segment.scene, &part.gaussians);
             // All chunks have one environment map, and the same sockets and colliders, in the first file.
-            scene.environment = scene.environment.filter(|_| chunks.is_empty());
-            if !chunks.is_empty() {
+            scene.environment = scene.environment.filter(|_| files.is_empty());
+            if !files.is_empty() {
                 scene.sockets.clear();
                 scene.colliders = None;
             }
-            save(&path, &scene, &write_settings(&scene.form, level))?;
-            chunks.push(Chunk { path, times: self.times(segment, run), gaussians: run.gaussians.len() });
+            save(&path, &scene, &settings)?;
+            let bytes = fs::metadata(&path).map_err(|error| FileError::at(&path, error))?.len();
+            let Part { stretches, layer, ref gaussians } = *part;
+            let file = ChunkFile { stretches, layer, gaussians: gaussians.len() as u64, bytes };
+            files.push(Chunk { path, times: self.times(&segment.scene, stretches), file });
             progress.advance();
         }
+        proceed(progress)?;
+        let table = ChunkTable {
+            stretches: self.stretches,
+            gaussian_bytes: segment.scene.gaussian_bytes(),
+            files: files.iter().map(|chunk| chunk.file).collect(),
+        };
+        let chunks = Some(Arc::new(table.clone()));
+        let scene = GaussianScene { filter: None, chunks, ..select(&segment.scene, &[]) };
+        save(&index, &scene, &settings)?;
+        progress.advance();
         progress.finish();
-        Ok(chunks)
+        Ok(Chunks { index, table, files })
     }
 
-    /// Returns the times between which a run is alive, timestamp units.
-    fn times(&self, segment: &Segment, run: &Run) -> [f64; 2] {
-        let [first, last] = segment.scene.trained_with.time_interval.map(f64::from);
+    /// Returns the times between which Gaussians of these stretches are alive, timestamp units.
+    fn times(&self, scene: &GaussianScene, stretches: [u32; 2]) -> [f64; 2] {
+        let [first, last] = scene.trained_with.time_interval.map(f64::from);
         let time = |stretch: u32| first + (last - first) * f64::from(stretch) / f64::from(self.stretches);
-        [time(run.chunks[0]), time(run.chunks[1] + 1)]
+        [time(stretches[0]), time(stretches[1] + 1)]
     }
 }
 
+/// Removes the index of an earlier split: its table is not that of the files that are written now.
+fn remove_index(index: &Path) -> Result<(), FileError> {
+    match fs::remove_file(index) {
+        Err(error) if error.kind() != ErrorKind::NotFound => Err(FileError::at(index, error)),
+        _ => Ok(()),
+    }
+}
+
+/// Returns the importance of a Gaussian for pictures; 0 if it is not a number.
+fn importance(gaussian: &Gaussian) -> f32 {
+    let importance = gaussian.importance();
+    if importance.is_nan() { 0.0 } else { importance }
+}
+
 /// Returns the first and the last stretch of time in which each Gaussian may be drawn.
-fn lives(segment: &Segment, stretches: u32) -> Result<Vec<[u32; 2]>, SegmentsError> {
-    let (scene, trained_with) = (&segment.scene, &segment.scene.trained_with);
-    let filter = match &scene.filter {
-        Some(filter) => filter.clone(),
-        None => {
-            let gaussians = scene.gaussians().map_err(|error| segment.at(error))?;
-            let (interval, cutoff) = (trained_with.time_interval, trained_with.marginal_cutoff);
-            TemporalFilter::support(gaussians.iter().copied(), interval, cutoff, stretches)
-        }
+fn lives(scene: &GaussianScene, gaussians: &[Gaussian], stretches: u32) -> Vec<[u32; 2]> {
+    let support = || {
+        let (interval, cutoff) = (scene.trained_with.time_interval, scene.trained_with.marginal_cutoff);
+        TemporalFilter::support(gaussians.iter().copied(), interval, cutoff, stretches)
     };
+    let filter = scene.filter.clone().unwrap_or_else(support);
     let words = intervals(&filter).unwrap_or_else(|| hulls(&filter));
     let (count, segments) = (u64::from(stretches), u64::from(filter.segments.max(1)));
     let life = |word: &u32| {
@@ -111,7 +177,7 @@ fn lives(segment: &Segment, stretches: u32) -> Result<Vec<[u32; 2]>, SegmentsErr
         let last = ((last + 1) * count).div_ceil(segments).clamp(1, count) - 1;
         [first.min(last) as u32, last as u32]
     };
-    Ok(words.iter().map(life).collect())
+    words.iter().map(life).collect()
 }
 
 /// Returns a chunk file in a folder that is none of these files: it would be read with them. `None` if there is no such
@@ -126,45 +192,119 @@ mod tests {
     use super::*;
     use crate::codec::{self, ReadOptions};
     use crate::offline::work::NoProgress;
+    use crate::offline::work::progress::InterruptedProgress;
     use crate::scene::synth::{SynthSettings, synthesize};
-    use std::sync::Arc;
+    use crate::scene::{Colliders, Environment};
+
+    const COUNT: usize = 6000;
 
     fn read(path: &Path) -> Segment {
         let scene = codec::load(path, &ReadOptions::default()).expect("the package can be read");
         Segment { path: path.to_owned(), scene }
     }
 
+    fn whole() -> Segment {
+        let mut scene = synthesize(&SynthSettings { count: COUNT, ..SynthSettings::default() });
+        scene.colliders = Some(Arc::default());
+        Segment { path: PathBuf::from("whole.gs4d"), scene }
+    }
+
+    fn cut(whole: &Segment, shares: &[u32], folder: &Path) -> (Split, Chunks) {
+        let shares = LayerShares::new(shares.to_vec()).expect("shares of 100 in all");
+        let split = Split::of(whole, 8, &shares).expect("every Gaussian can be drawn");
+        let chunks = split.write(whole, folder, Some(1), &mut NoProgress).expect("files can be written");
+        (split, chunks)
+    }
+
     #[test]
     fn chunks_are_the_whole_capture_and_united_they_stay_as_they_are() {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let mut scene = synthesize(&SynthSettings { count: 4000, ..SynthSettings::default() });
-        scene.colliders = Some(Arc::default());
-        let mut whole = Segment { path: PathBuf::from("whole.gs4d"), scene };
-        let mut before = Vec::new();
-        for round in 0..2 {
-            let split = Split::of(&whole, 8).expect("every Gaussian can be drawn");
-            let chunks = split.write(&whole, folder.path(), Some(1), &mut NoProgress).expect("files can be written");
-            assert_eq!(chunks.iter().map(|chunk| chunk.gaussians).sum::<usize>(), 4000, "each Gaussian once");
-            assert!(chunks.len() > 2, "several runs: {}", chunks.len());
-            let files = split.paths(folder.path());
-            assert_eq!(other_chunk(folder.path(), &files), None, "no other chunk");
-            assert_eq!(other_chunk(folder.path(), &files[1..]), Some(files[0].clone()), "another chunk");
-            for (chunk, file) in chunks.iter().zip(&files) {
-                let [first, last] = chunk.times;
-                let own = read(file);
-                assert_eq!(own.scene.colliders.is_some(), *file == files[0], "the first file has the colliders");
-                for gaussian in own.scene.gaussians().expect("every Gaussian can be drawn").iter() {
-                    let is_drawn = |time: f64| gaussian.marginal(time as f32) > own.scene.trained_with.marginal_cutoff;
-                    assert!(first <= 0.0 || !is_drawn(first - 1e-3), "alive before {first}");
-                    assert!(last >= 1.0 || !is_drawn(last + 1e-3), "alive after {last}");
+        for shares in [&[100][..], &[25, 25, 50]] {
+            let folder = tempfile::tempdir().expect("a temporary folder");
+            let (mut whole, mut before) = (whole(), Vec::new());
+            for round in 0..2 {
+                let (split, chunks) = cut(&whole, shares, folder.path());
+                let count = chunks.files.iter().map(|chunk| chunk.file.gaussians).sum::<u64>();
+                assert_eq!(count, COUNT as u64, "each Gaussian once");
+                assert_eq!(chunks.table.layers(), shares.len() as u32, "as many layers as shares");
+                assert!(chunks.files.len() > 2, "several runs: {}", chunks.files.len());
+                let files = split.paths(folder.path());
+                assert_eq!(other_chunk(folder.path(), &files), None, "no other chunk");
+                assert_eq!(other_chunk(folder.path(), &files[1..]), Some(files[0].clone()), "another chunk");
+                for (chunk, file) in chunks.files.iter().zip(&files) {
+                    let [first, last] = chunk.times;
+                    let own = read(file);
+                    assert_eq!(own.scene.colliders.is_some(), *file == files[0], "the first file has the colliders");
+                    let cutoff = own.scene.trained_with.marginal_cutoff;
+                    for gaussian in own.scene.gaussians().expect("every Gaussian can be drawn").iter() {
+                        let is_drawn = |time: f64| gaussian.marginal(time as f32) > cutoff;
+                        assert!(first <= 0.0 || !is_drawn(first - 1e-3), "alive before {first}");
+                        assert!(last >= 1.0 || !is_drawn(last + 1e-3), "alive after {last}");
+                    }
                 }
+                let united = unite(files.iter().map(|file| read(file)).collect(), &mut NoProgress);
+                whole.scene = united.expect("chunks of one capture");
+                assert!(whole.scene.colliders.is_some(), "the whole capture has the colliders");
+                let written = files.iter().chain([&chunks.index]);
+                let bytes: Vec<Vec<u8>> = written.map(|file| fs::read(file).expect("it was written")).collect();
+                assert!(round == 0 || bytes == before, "the chunks of united chunks are the same files");
+                before = bytes;
             }
-            let united = unite(files.iter().map(|file| read(file)).collect(), &mut NoProgress);
-            whole.scene = united.expect("chunks of one capture");
-            assert!(whole.scene.colliders.is_some(), "the whole capture has the colliders");
-            let bytes: Vec<Vec<u8>> = files.iter().map(|file| std::fs::read(file).expect("it was written")).collect();
-            assert!(round == 0 || bytes == before, "the chunks of united chunks are the same files");
-            before = bytes;
         }
+    }
+
+    #[test]
+    fn the_first_layer_of_a_run_is_the_most_important() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let (_, chunks) = cut(&whole(), &[25, 25, 50], folder.path());
+        let order = |chunk: &Chunk| (chunk.file.stretches, chunk.file.layer);
+        assert!(chunks.files.is_sorted_by_key(order), "by first stretch, the shorter first, then by layer");
+        let extremes = |chunk: &Chunk| {
+            let scene = read(&chunk.path).scene;
+            let gaussians = scene.gaussians().expect("every Gaussian can be drawn");
+            let ends = (f32::INFINITY, 0.0_f32);
+            gaussians.iter().map(importance).fold(ends, |(least, most), own| (least.min(own), most.max(own)))
+        };
+        let mut compared = 0;
+        for pair in chunks.files.windows(2).filter(|pair| pair[0].file.stretches == pair[1].file.stretches) {
+            assert_eq!(pair[0].file.layer + 1, pair[1].file.layer, "no layer is left out");
+            let ((least, _), (_, most)) = (extremes(&pair[0]), extremes(&pair[1]));
+            assert!(least >= most, "{least} in a layer, {most} in the next");
+            compared += 1;
+        }
+        assert!(compared >= 2, "a run of three layers: {compared}");
+    }
+
+    #[test]
+    fn the_index_has_everything_but_the_gaussians() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let mut whole = whole();
+        whole.scene.environment = Some(Environment { width: 2, height: 1, texels: vec![0.25; 6] });
+        let (_, chunks) = cut(&whole, &[50, 50], folder.path());
+        let index = read(&folder.path().join(ChunkTable::INDEX)).scene;
+        let table = index.chunks.as_deref().expect("a table");
+        assert_eq!(*table, chunks.table, "the table is read back");
+        assert_eq!((table.check(), table.stretches, table.files.len()), (Ok(()), 8, chunks.files.len()), "its numbers");
+        assert_eq!(table.gaussian_bytes, whole.scene.gaussian_bytes(), "the size of a Gaussian");
+        for (number, file) in table.files.iter().enumerate() {
+            let path = folder.path().join(ChunkTable::file_name(number, table.files.len()));
+            assert_eq!(file.bytes, fs::metadata(&path).expect("the file exists").len(), "the length of file {number}");
+            assert_eq!(file.gaussians, read(&path).scene.len() as u64, "the Gaussians of file {number}");
+        }
+        assert!(index.is_empty() && index.filter.is_none(), "no Gaussian, no filter");
+        assert_eq!(index.form.color_degrees(), whole.scene.form.color_degrees(), "the color of the whole");
+        assert_eq!(index.environment, whole.scene.environment, "the environment map");
+        assert_eq!(index.colliders.as_deref(), Some(&Colliders::default().rounded()), "the colliders");
+        assert_eq!((index.trained_with, index.playback), (whole.scene.trained_with, whole.scene.playback), "settings");
+    }
+
+    #[test]
+    fn an_interrupted_split_leaves_no_index() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let whole = whole();
+        let (split, chunks) = cut(&whole, &[100], folder.path());
+        assert!(chunks.index.exists(), "an index");
+        let interrupted = split.write(&whole, folder.path(), Some(1), &mut InterruptedProgress);
+        assert!(matches!(interrupted, Err(SegmentsError::Interrupted(_))), "the second split is interrupted");
+        assert!(!chunks.index.exists(), "the files may be of two splits");
     }
 }

@@ -1,7 +1,8 @@
 //! The buffers of a capture, which `project` and `activate` read.
 //!
 //! In: the [`Form`] of a scene, its filter and its environment map, and a range of its Gaussians. Out: storage buffers in the order of the
-//! shader's bindings, which are filled in chunks. Packed scenes are uploaded without unpacking.
+//! shader's bindings, which are filled in chunks. Packed scenes are uploaded without unpacking. `scene/gaussian_bytes.rs` has the size of all
+//! for each Gaussian.
 
 use crate::gaussian::Gaussian;
 use crate::renderer::device::memory::Allocator;

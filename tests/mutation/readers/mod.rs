@@ -69,7 +69,7 @@ pub struct Kind {
 pub static KINDS: &[Kind] = &[
     Kind {
         name: "package",
-        about: "packages (.gs4d) in every form, with filters, environment maps and colliders",
+        about: "packages (.gs4d) in every form, with filters, environment maps, colliders and tables of chunk files",
         extension: "gs4d",
         share: 1,
         make: || Arc::new(package::Packages::new()),

@@ -17,8 +17,8 @@ use bevy_gs4d::internal::codec::{FLOAT_PLANES, PACKAGE};
 use bevy_gs4d::offline::compress::{CompressSettings, compress};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{
-    ColliderMesh, ColliderStretch, Colliders, Environment, FilterKind, GaussianScene, Level, RuntimeScene, SceneForm,
-    TemporalFilter, Trained,
+    ChunkFile, ChunkTable, ColliderMesh, ColliderStretch, Colliders, Environment, FilterKind, GaussianScene, Level,
+    RuntimeScene, SceneForm, TemporalFilter, Trained,
 };
 use std::io::Cursor;
 use std::sync::Arc;
@@ -137,7 +137,17 @@ fn scenes() -> Vec<GaussianScene> {
         pack(0, 0, &[]),
         layered,
         synthesize(&SynthSettings { count: 0, ..SynthSettings::default() }),
+        index(),
     ]
+}
+
+/// Returns the index of a capture in chunk files.
+fn index() -> GaussianScene {
+    let file = |first, last, layer| ChunkFile { stretches: [first, last], layer, gaussians: 300, bytes: 9_000 };
+    let files = vec![file(0, 0, 0), file(0, 3, 0), file(0, 3, 1), file(2, 3, 0)];
+    let table = ChunkTable { stretches: 4, gaussian_bytes: 88, files };
+    let empty = synthesize(&SynthSettings { count: 0, ..SynthSettings::default() });
+    GaussianScene { chunks: Some(Arc::new(table)), ..empty }
 }
 
 /// Returns a tetrahedron at rest, one that grows, and nothing afterwards.
@@ -341,7 +351,8 @@ fn change_number(header: &mut Header, random: &mut Random) {
     const COEFFICIENTS: [usize; 14] = [0, 1, 2, 4, 5, 9, 10, 15, 16, 17, 32, 33, 48, 49];
     let any = random.one_in(5).then(|| numbers::whole(random));
     let small = |random: &mut Random| any.map_or(random.below(5) as u32, |any| any as u32);
-    match random.below(11) {
+    match random.below(12) {
+        11 => change_chunks(&mut header.chunks, random),
         10 => header.layers = (0..random.below(4)).map(|_| *random.pick(&[0, 256, 512, 100, usize::MAX])).collect(),
         9 => change_colliders(&mut header.colliders, random),
         8 => {
@@ -383,6 +394,22 @@ fn change_colliders(colliders: &mut Option<StoredColliders>, random: &mut Random
         (5, Some(stretch)) => stretch.mesh = StoredMesh { triangles: count, ..stretch.mesh },
         (6, _) => *standing = StoredMesh { points: count, ..*standing },
         _ => *colliders = None,
+    }
+}
+
+/// Changes one number of a table of chunk files, or takes it away.
+fn change_chunks(chunks: &mut Option<ChunkTable>, random: &mut Random) {
+    let Some(table) = chunks else { return };
+    let (at, small) = (random.below(table.files.len()), random.below(6) as u64);
+    let any = if random.one_in(2) { numbers::whole(random) } else { small };
+    match (random.below(7), table.files.get_mut(at)) {
+        (0, _) => table.stretches = any as u32,
+        (1, _) => table.gaussian_bytes = any as u32,
+        (2, Some(file)) => file.stretches[random.below(2)] = any as u32,
+        (3, Some(file)) => file.layer = any as u32,
+        (4, Some(file)) => file.gaussians = any,
+        (5, Some(file)) => file.bytes = any,
+        _ => *chunks = None,
     }
 }
 

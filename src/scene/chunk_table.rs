@@ -1,0 +1,177 @@
+//! The chunk files of a capture: which Gaussians are in which file.
+//!
+//! In: the files that `gs4d split` wrote. Out: a [`ChunkTable`], part of the index of the capture, which has no Gaussians
+//! itself: from the table a player knows which files it needs at a time, and how many bytes they are, before it asks for
+//! one.
+
+use serde::{Deserialize, Serialize};
+
+/// The chunk files of a capture, in the order of their numbers.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ChunkTable {
+    /// Number of stretches of time into which the capture is cut, of equal length.
+    pub stretches: u32,
+    /// Bytes of a Gaussian of any file on the GPU, its color and its part of the temporal filter included
+    /// ([`GaussianScene::gaussian_bytes`](super::GaussianScene::gaussian_bytes)).
+    pub gaussian_bytes: u32,
+    /// The files.
+    pub files: Vec<ChunkFile>,
+}
+
+/// A chunk file: Gaussians that are only drawn within some stretches of time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(from = "Entry", into = "Entry")]
+pub struct ChunkFile {
+    /// The first and the last stretch of time.
+    pub stretches: [u32; 2],
+    /// Its layer: 0 has the most important Gaussians of its stretches.
+    pub layer: u32,
+    /// Number of Gaussians.
+    pub gaussians: u64,
+    /// Length of the file.
+    pub bytes: u64,
+}
+
+/// A chunk file as it is stored: first and last stretch, layer, Gaussians, bytes.
+#[derive(Serialize, Deserialize)]
+struct Entry(u32, u32, u32, u64, u64);
+
+impl From<Entry> for ChunkFile {
+    fn from(Entry(first, last, layer, gaussians, bytes): Entry) -> Self {
+        Self { stretches: [first, last], layer, gaussians, bytes }
+    }
+}
+
+impl From<ChunkFile> for Entry {
+    fn from(file: ChunkFile) -> Self {
+        Self(file.stretches[0], file.stretches[1], file.layer, file.gaussians, file.bytes)
+    }
+}
+
+impl ChunkTable {
+    /// The name of the index of a capture in chunk files.
+    pub const INDEX: &str = "index.gs4d";
+    /// Most stretches of time of a capture.
+    pub const MOST_STRETCHES: u32 = 10_000;
+    /// Most chunk files of a capture.
+    pub const MOST_FILES: usize = 99_999;
+    /// Most layers.
+    pub const MOST_LAYERS: u32 = 16;
+
+    /// Returns the name of a chunk file. `number` counts from 0.
+    pub fn file_name(number: usize, of: usize) -> String {
+        format!("chunk-{:05}-of-{of:05}.gs4d", number + 1)
+    }
+
+    /// Returns the bytes of a file's Gaussians on the GPU. `file` counts from 0; 0 for a file that is not there.
+    pub fn gpu_bytes(&self, file: usize) -> u64 {
+        self.files.get(file).map_or(0, |file| file.gaussians.saturating_mul(self.gaussian_bytes.into()))
+    }
+
+    /// Returns the number of layers.
+    pub fn layers(&self) -> u32 {
+        self.files.iter().map(|file| file.layer.saturating_add(1)).max().unwrap_or_default()
+    }
+
+    /// Returns the bytes of all files of the layers up to this one.
+    pub fn bytes_up_to(&self, layer: u32) -> u64 {
+        let own = self.files.iter().filter(|file| file.layer <= layer);
+        own.map(|file| file.bytes).fold(0, u64::saturating_add)
+    }
+
+    /// Returns the bytes of the files that a picture of a stretch of time needs, of the layers up to this one.
+    pub fn bytes_at(&self, stretch: u32, layer: u32) -> u64 {
+        let is_drawn = |file: &&ChunkFile| (file.stretches[0]..=file.stretches[1]).contains(&stretch);
+        let own = self.files.iter().filter(|file| file.layer <= layer).filter(is_drawn);
+        own.map(|file| file.bytes).fold(0, u64::saturating_add)
+    }
+
+    /// Returns the stretch of a time of a capture that lasts `duration` seconds; the first of a still.
+    pub fn stretch_at(&self, seconds: f64, duration: f64) -> u32 {
+        let share = if duration > 0.0 { seconds / duration } else { 0.0 };
+        // NaN counts as 0.
+        ((share * f64::from(self.stretches)).max(0.0) as u32).min(self.stretches.saturating_sub(1))
+    }
+
+    /// Checks that a player can use the table.
+    ///
+    /// # Errors
+    /// A description of the first fault.
+    pub fn check(&self) -> Result<(), &'static str> {
+        if !(1..=Self::MOST_STRETCHES).contains(&self.stretches) {
+            return Err("a table of chunk files whose number of stretches is not 1 to 10000");
+        }
+        if self.files.len() > Self::MOST_FILES {
+            return Err("a table of more than 99999 chunk files");
+        }
+        if self.gaussian_bytes == 0 {
+            return Err("a table of chunk files whose Gaussians have no bytes");
+        }
+        for ChunkFile { stretches: [first, last], layer, gaussians, bytes } in &self.files {
+            if first > last || *last >= self.stretches {
+                return Err("a chunk file whose stretches of time do not exist, or are not in order");
+            }
+            if *layer >= Self::MOST_LAYERS {
+                return Err("a chunk file of a layer above 15");
+            }
+            // Sums over all files stay below 2^64.
+            if *gaussians > u64::from(u32::MAX) || *bytes > 1 << 40 {
+                return Err("a chunk file of more than 4294967295 Gaussians, or of more than 1 TiB");
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table() -> ChunkTable {
+        let file = |first, last, layer| ChunkFile { stretches: [first, last], layer, gaussians: 10, bytes: 1000 };
+        ChunkTable { stretches: 4, gaussian_bytes: 80, files: vec![file(0, 0, 0), file(0, 3, 1), file(2, 3, 0)] }
+    }
+
+    #[test]
+    fn an_entry_is_five_numbers() {
+        let text = ron::to_string(&table()).expect("numbers can be written");
+        assert!(text.contains("(0,3,1,10,1000)"), "short: {text}");
+        assert_eq!(ron::from_str::<ChunkTable>(&text), Ok(table()), "and read again");
+    }
+
+    #[test]
+    fn a_time_has_a_stretch() {
+        let at = |seconds: f64| table().stretch_at(seconds, 8.0);
+        assert_eq!([-1.0, 0.0, 1.9, 2.0, 7.9, 8.0, 99.0].map(at), [0, 0, 0, 1, 3, 3, 3], "clamped to the capture");
+        assert_eq!((at(f64::NAN), table().stretch_at(3.0, 0.0)), (0, 0), "NaN, and a still");
+    }
+
+    #[test]
+    fn bytes_are_those_of_some_layers_and_of_a_stretch() {
+        let table = table();
+        assert_eq!((table.layers(), ChunkTable { files: Vec::new(), ..table.clone() }.layers()), (2, 0), "the layers");
+        assert_eq!([0, 1, 9].map(|layer| table.bytes_up_to(layer)), [2000, 3000, 3000], "two files of layer 0, three");
+        let at = |stretch| [0, 1].map(|layer| table.bytes_at(stretch, layer));
+        assert_eq!([0, 1, 2, 4].map(at), [[1000, 2000], [0, 1000], [1000, 2000], [0, 0]], "of a stretch");
+    }
+
+    #[test]
+    fn faulty_tables_are_refused() {
+        assert_eq!(table().check(), Ok(()), "a good table");
+        assert_eq!((table().gpu_bytes(1), table().gpu_bytes(3)), (800, 0), "bytes of a file on the GPU");
+        let faults: [fn(&mut ChunkTable); 7] = [
+            |table| table.stretches = 0,
+            |table| table.gaussian_bytes = 0,
+            |table| table.files[0].stretches = [1, 0],
+            |table| table.files[0].stretches = [3, 4],
+            |table| table.files[0].layer = 16,
+            |table| table.files[0].gaussians = u64::MAX,
+            |table| table.files[0].bytes = u64::MAX,
+        ];
+        for (number, fault) in faults.into_iter().enumerate() {
+            let mut bad = table();
+            fault(&mut bad);
+            assert!(bad.check().is_err(), "fault {number}");
+        }
+    }
+}
