@@ -112,8 +112,8 @@
 //! other, as are `plugin` and [`offline`]: a game compiles neither datasets nor metrics. Code that two rings need is in
 //! a ring inside both.
 //!
-//! * `plugin` has rings of its own, `component ▶ asset ▶ playback ▶ render ▶ pbr, picker, stereo ▶ picking_backend,
-//!   inspector, testing`, of which `pbr`, `picking_backend` (feature `picking`), `inspector` and `testing` are
+//! * `plugin` has rings of its own, `component ▶ asset ▶ playback ▶ render ▶ stream ▶ pbr, picker, stereo ▶
+//!   picking_backend, inspector, testing`, of which `pbr`, `picking_backend` (feature `picking`), `inspector` and `testing` are
 //!   features. The crate root re-exports them: a game writes `bevy_gs4d::playback`.
 //! * A picture is a [`Picture`](view::Picture), not an `Image`: Bevy and the crate `image` have an `Image` each, and
 //!   one file may need all three.
@@ -125,7 +125,7 @@
 //! # Modules for games
 //!
 //! [`asset`] loads and reloads files, and reports their states. [`picker`] finds the Gaussian that a ray hits.
-//! [`stereo`] has two eyes on one head. [`inspector`] is a panel that shows and edits captures, [`testing`] renders an
+//! [`stereo`] has two eyes on one head, [`stream`] plays captures of minutes in fixed memory. [`inspector`] is a panel that shows and edits captures, [`testing`] renders an
 //! app to pictures without a window. `docs/guide.md` is the guide for games, `docs/command.md` the guide of the
 //! command, `docs/filming.md` the chapter from several cameras to a capture.
 //!
@@ -138,6 +138,8 @@
 //! | [`CaptureState`](asset::CaptureState), [`Playback`](playback::Playback), [`CaptureSettings`](render::CaptureSettings) | captures; `Playback` also timelines | the plugins, unless the game does |
 //! | [`Upright`] | captures | the game; it requires [`UprightTurn`] |
 //! | [`Markers`](playback::Markers), [`FollowsClock`](playback::FollowsClock) | captures; `FollowsClock` also timelines | the game |
+//! | [`CaptureStreamSettings`](stream::CaptureStreamSettings), [`CaptureStreamState`](stream::CaptureStreamState) | captures in chunk files | the game; the plugins |
+//! | [`CapturePart`](stream::CapturePart) | children of captures in chunk files | the plugins |
 //! | [`CaptureSocket`](playback::CaptureSocket), [`SocketState`](playback::SocketState) | children of captures | the game; the first requires the second |
 //! | [`CaptureCollider`](playback::CaptureCollider), [`ColliderState`](playback::ColliderState) | children of captures | the game; the first requires the second |
 //! | [`PlaybackClock`](playback::PlaybackClock) | an entity of its own; timelines | the game; the plugins on timelines |
@@ -155,6 +157,7 @@
 //! | [`PlaybackSystems::Clocks`](playback::PlaybackSystems::Clocks) | `Update` | advance clocks |
 //! | [`PlaybackSystems::Timelines`](playback::PlaybackSystems::Timelines) | `Update`, after `Clocks` | advance timelines, set up their tracks |
 //! | [`PlaybackSystems::Advance`](playback::PlaybackSystems::Advance) | `Update`, after `Timelines` | advance captures; send the messages about playing |
+//! | [`CaptureStreamSystems`](stream::CaptureStreamSystems) | `Update`, after `Advance` | load and give up chunk files; send the messages about streaming |
 //! | [`PlaybackSystems::Colliders`](playback::PlaybackSystems::Colliders) | `Update`, after `Advance` | give entities with colliders the mesh of the time; send [`CaptureColliderChanged`](playback::CaptureColliderChanged) |
 //! | [`PlaybackSystems::Sockets`](playback::PlaybackSystems::Sockets) | `PostUpdate`, after Bevy's `AnimationSystems`, before `TransformSystems::Propagate` | move entities with sockets |
 //! | Bevy's `VisibilitySystems::CalculateBounds` | `PostUpdate` | update the `Aabb` of captures |
@@ -181,7 +184,7 @@
 //! | none | [`view`], [`gaussian`], [`scene`], [`codec`], [`mod@reference`]: no GPU, no Bevy | |
 //! | `renderer` | [`renderer`], on wgpu | |
 //! | `offline` | [`offline`] | `renderer` |
-//! | `bevy` (default) | `plugin`: [`asset`], [`playback`], [`render`], [`picker`], [`stereo`]; [`prelude`] | `renderer` |
+//! | `bevy` (default) | `plugin`: [`asset`], [`playback`], [`render`], [`stream`], [`picker`], [`stereo`]; [`prelude`] | `renderer` |
 //! | `pbr` (default) | [`pbr`]: captures among Bevy's lit meshes | `bevy` |
 //! | `picking` (default) | pointer events on captures | `bevy` |
 //! | `fourdgs` | reading and writing `.4dgs` files | |

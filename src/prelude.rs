@@ -49,3 +49,7 @@ pub use crate::plugin::playback::{
 pub use crate::plugin::render::{
     CaptureBudget, CaptureDetail, CaptureSettings, CaptureStatistics, CaptureUploadBudget, CaptureViewSettings,
 };
+#[doc(no_inline)]
+pub use crate::plugin::stream::{
+    CaptureBuffered, CaptureBuffering, CaptureStalled, CaptureStreamSettings, CaptureStreamState,
+};

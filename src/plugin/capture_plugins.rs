@@ -7,7 +7,7 @@
 use super::pbr;
 #[cfg(feature = "picking")]
 use super::picking_backend;
-use super::{asset, playback, render, stereo};
+use super::{asset, playback, render, stereo, stream};
 use bevy::app::plugin_group;
 
 plugin_group! {
@@ -42,6 +42,7 @@ plugin_group! {
         asset:::CaptureAssetPlugin,
         playback:::CapturePlaybackPlugin,
         render:::CaptureRenderPlugin,
+        stream:::CaptureStreamPlugin,
         stereo:::StereoPlugin,
         #[cfg(feature = "pbr")]
         pbr:::CapturePbrPlugin,

@@ -39,6 +39,7 @@ mod shadows;
 mod sockets;
 mod steady;
 mod stereo;
+mod stream;
 mod testing;
 mod timeline;
 mod views;
@@ -53,6 +54,7 @@ mod support {
     pub mod event_log;
     pub mod fixtures;
     pub mod flat;
+    pub mod gated_files;
     pub mod gpu;
     pub mod gray;
     pub mod limited_app;

@@ -23,6 +23,8 @@ pub(super) struct UploadStates {
     drawn: HashSet<AssetId<GaussianCapture>>,
     /// Captures whose upload has ended since the last [`take_finished`](Self::take_finished).
     finished: HashSet<AssetId<GaussianCapture>>,
+    /// Captures in chunk files whose first picture is there.
+    streams: HashSet<AssetId<GaussianCapture>>,
     pub(super) failures: HashMap<AssetId<GaussianCapture>, UploadFailure>,
 }
 
@@ -38,6 +40,11 @@ impl UploadStates {
     /// Returns whether a loaded capture is drawn.
     pub(super) fn is_drawn(&self, capture: AssetId<GaussianCapture>) -> bool {
         !self.expected || self.drawn.contains(&capture)
+    }
+
+    /// Returns whether a capture in chunk files has no picture yet.
+    pub(super) fn is_blank(&self, id: AssetId<GaussianCapture>, capture: &GaussianCapture) -> bool {
+        capture.scene().chunks.is_some() && !self.streams.contains(&id)
     }
 
     /// Returns the captures whose upload has ended since the last call; `None` without a render world that uploads
@@ -57,6 +64,26 @@ impl Uploads {
     pub(crate) fn awaits(&self, capture: AssetId<GaussianCapture>) -> bool {
         let states = self.lock();
         !states.is_drawn(capture) && !states.failures.contains_key(&capture)
+    }
+
+    /// Returns whether a loaded capture is in chunk files and has no picture yet.
+    pub(crate) fn is_blank(&self, id: AssetId<GaussianCapture>, capture: &GaussianCapture) -> bool {
+        self.lock().is_blank(id, capture)
+    }
+
+    /// Returns whether the upload of a capture has failed.
+    pub(crate) fn has_failed(&self, capture: AssetId<GaussianCapture>) -> bool {
+        self.lock().failures.contains_key(&capture)
+    }
+
+    /// Records that the first picture of a capture in chunk files is there.
+    pub(crate) fn show_stream(&self, index: AssetId<GaussianCapture>) {
+        self.lock().streams.insert(index);
+    }
+
+    /// Records that a capture in chunk files is not streamed any more.
+    pub(crate) fn end_stream(&self, index: AssetId<GaussianCapture>) {
+        self.lock().streams.remove(&index);
     }
 
     /// Records that the upload of a capture begins. `is_drawn`: whether an earlier version is drawn until the upload

@@ -16,6 +16,7 @@
 //! | warnings | captures that failed to load, that no camera sees or that have times without active Gaussians; cameras that cannot draw captures |
 //! | capture | the selected capture and its loading state, with the reason of a failure |
 //! | playback | play and pause, steps of one frame, the time below the marks of the key-frames, speed, repeat, range |
+//! | stream | of a capture in chunk files: what is there, late and on its way |
 //! | appearance | the capture's temporal filter, opacity, tint, exposure and crop box |
 //! | view | the camera's debug view, blend space, written depth, multisampling and tonemapping |
 //! | counts | Gaussians in total, active and visible, pairs, and the frame rate |
@@ -34,6 +35,7 @@ mod playback;
 mod plugin;
 mod presentation;
 mod settings;
+mod stream;
 mod timing;
 mod warnings;
 

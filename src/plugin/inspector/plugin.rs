@@ -8,11 +8,12 @@ use super::presentation::smoothed;
 use super::settings::Inspector;
 use super::timing::Measuring;
 use super::warnings::{IdleTimes, PlacedCamera, PlacedCapture};
-use super::{appearance, camera, counts, memory, playback, timing, warnings};
+use super::{appearance, camera, counts, memory, playback, stream, timing, warnings};
 use crate::plugin::asset::{CaptureAssetPlugin, CaptureState};
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use crate::plugin::playback::Playback;
 use crate::plugin::render::{CameraFault, CaptureSettings, CaptureStatistics, CaptureViewSettings, DepthWrite};
+use crate::plugin::stream::{CapturePart, CaptureStreamState};
 use bevy::app::{App, Last, Plugin, PreUpdate, Update};
 use bevy::asset::{AssetServer, Assets};
 use bevy::camera::visibility::{InheritedVisibility, VisibleEntities};
@@ -178,7 +179,8 @@ type Sight = (&'static Camera, &'static VisibleEntities, Option<&'static Composi
 #[derive(SystemParam)]
 struct Subject<'w, 's> {
     commands: Commands<'w, 's>,
-    captures: Query<'w, 's, CaptureParts>,
+    captures: Query<'w, 's, CaptureParts, Without<CapturePart>>,
+    streams: Query<'w, 's, &'static CaptureStreamState>,
     cameras: Query<'w, 's, CameraParts, With<Camera3d>>,
     sights: Query<'w, 's, Sight, With<Camera3d>>,
     shown: Query<'w, 's, &'static InheritedVisibility, With<GaussianCapture3d>>,
@@ -207,6 +209,9 @@ impl Subject<'_, '_> {
             let edited = playback::show(ui, *player, capture, &mut inspector.fps);
             player.set_if_neq(edited);
         });
+        if let Ok(state) = self.streams.get(shown) {
+            section(ui, "stream", true, |ui| stream::show(ui, state));
+        }
         section(ui, "appearance", false, |ui| {
             let edited = appearance::show(ui, *settings, capture.bounds());
             settings.set_if_neq(edited);

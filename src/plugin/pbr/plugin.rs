@@ -2,8 +2,9 @@
 //!
 //! In: an app in which captures are drawn. Out: order among lit meshes, shading, cast shadows and contact shadows.
 
-use super::{contact_shadow, order, shade, shadow};
+use super::{CaptureLight, CastsShadows, ReceivesShadows, contact_shadow, order, shade, shadow};
 use crate::plugin::render::has_captures;
+use crate::plugin::stream::copy_to_parts;
 use bevy::app::{App, Plugin};
 use bevy::render::RenderApp;
 
@@ -30,5 +31,8 @@ fn add_once(app: &mut App) {
         shade::build(app);
         shadow::build(app);
         contact_shadow::build(app);
+        copy_to_parts::<CastsShadows>(app);
+        copy_to_parts::<ReceivesShadows>(app);
+        copy_to_parts::<CaptureLight>(app);
     }
 }

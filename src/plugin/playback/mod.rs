@@ -37,6 +37,7 @@ mod plugin;
 mod repeat;
 mod socket;
 mod span;
+mod stall;
 mod state;
 mod stepping;
 mod systems;
@@ -53,6 +54,7 @@ pub use plugin::CapturePlaybackPlugin;
 pub(crate) use plugin::require_playback;
 pub use repeat::Repeat;
 pub use socket::{CaptureSocket, SocketState};
+pub(crate) use stall::Stall;
 pub use systems::PlaybackSystems;
 pub use timeline::{
     Clip, ClipFade, InvalidTimeline, Timeline, TimelineError, TimelineLoader, TimelinePlayer, TimelineTrack, Track,

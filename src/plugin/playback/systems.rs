@@ -8,10 +8,11 @@ use super::component::Playback;
 use super::drive::{Following, Shown};
 use super::markers::Markers;
 use super::messages::Announcer;
+use super::stall::Stall;
 use super::state::PlaybackState;
 use super::timeline::{TimelinePlayer, TimelineTrack};
 use crate::plugin::asset::Uploads;
-use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
+use crate::plugin::component::{CapturePart, GaussianCapture, GaussianCapture3d};
 use bevy::asset::{AssetId, Assets};
 use bevy::ecs::change_detection::DetectChangesMut;
 use bevy::ecs::entity::Entity;
@@ -52,7 +53,7 @@ pub(super) fn run_clocks(time: Res<Time>, mut clocks: Query<&mut PlaybackClock>)
 }
 
 /// Advances the playback of every loaded capture, followed captures before their followers. No time passes before the
-/// first drawn frame of a capture.
+/// first drawn frame of a capture, and while it is stalled. Parts of a capture have the time of their parent.
 pub(super) fn advance_captures(
     time: Res<Time>,
     captures: Res<Assets<GaussianCapture>>,
@@ -61,28 +62,28 @@ pub(super) fn advance_captures(
     clocks: Query<&PlaybackClock>,
     others: Query<(&Playback, &PlaybackState), (Without<GaussianCapture3d>, Without<TimelinePlayer>)>,
     mut players: Query<
-        (Entity, &GaussianCapture3d, &mut Playback, &mut PlaybackState, Option<&Markers>),
-        Without<TimelinePlayer>,
+        (Entity, &GaussianCapture3d, &mut Playback, &mut PlaybackState, Option<&Markers>, Option<&Stall>),
+        (Without<TimelinePlayer>, Without<CapturePart>),
     >,
     mut announcer: Announcer,
 ) {
     let _span = debug_span!("gs4d/playback").entered();
     let order = following.order(players.iter().map(|(entity, ..)| entity));
     for player in order {
-        let (id, mut state) = match players.get(player) {
-            Ok((_, handle, _, state, _)) if captures.contains(&handle.0) => (handle.0.id(), state.clone()),
-            Ok(_) | Err(_) => continue,
-        };
+        let Ok((_, handle, _, state, _, stall)) = players.get(player) else { continue };
+        let (id, mut state) = (handle.0.id(), state.clone());
+        let Some(capture) = captures.get(id) else { continue };
         state.play_asset(id.untyped());
-        let awaited = state.is_unplayed() && uploads.awaits(id);
+        let awaited = stall.is_some_and(|stall| stall.0)
+            || state.is_unplayed() && (uploads.awaits(id) || uploads.is_blank(id, capture));
         let shown = |clock: Entity| {
             let by_player = |(playback, state): (&Playback, &PlaybackState)| Shown::by_player(playback, state);
             let by_clock = clocks.get(clock).ok().map(Shown::by_clock);
-            let by_capture = || players.get(clock).ok().map(|(_, _, playback, state, _)| by_player((playback, state)));
+            let by_capture = || players.get(clock).ok().map(|(_, _, playback, state, ..)| by_player((playback, state)));
             by_clock.or_else(by_capture).or_else(|| others.get(clock).ok().map(by_player))
         };
         let drive = following.drive(player, &time, shown, &mut state).unless(awaited);
-        let Ok((entity, handle, mut playback, mut kept, markers)) = players.get_mut(player) else { continue };
+        let Ok((entity, handle, mut playback, mut kept, markers, _)) = players.get_mut(player) else { continue };
         let Some(capture) = captures.get(&handle.0) else { continue };
         let (next, progress) = state.advance(*playback, drive, capture.duration_seconds());
         *kept = state;

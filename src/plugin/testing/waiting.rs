@@ -9,6 +9,7 @@ use crate::plugin::asset::{CaptureState, Uploads};
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use crate::plugin::playback::{Timeline, TimelinePlayer};
 use crate::plugin::render::CaptureStatistics;
+use crate::plugin::stream::CaptureStreamState;
 use bevy::app::{App, PluginsState};
 use bevy::asset::{AssetId, AssetServer, Assets, LoadState, UntypedAssetId};
 use bevy::ecs::resource::Resource;
@@ -159,15 +160,19 @@ fn missing(world: &mut World) -> Result<Vec<String>, TestingError> {
 /// Returns the names of loaded captures that are not drawn yet.
 fn uploading(world: &mut World) -> Vec<String> {
     let mut spawned = world.query::<(&GaussianCapture3d, &CaptureState)>();
+    let mut streamed = world.query::<(&GaussianCapture3d, &CaptureStreamState)>();
     let players = players(world);
     let Some(loaded) = world.get_resource::<Assets<GaussianCapture>>() else { return Vec::new() };
+    // Pictures are taken of all Gaussians that the budget leaves room for.
+    let is_coarse = |state: &CaptureStreamState| !state.is_coarse || !state.is_whole() && state.requests > 0;
+    let coarse = streamed.iter(world).filter(|(_, state)| is_coarse(state)).map(|(capture, _)| capture.0.id());
     let waiting = spawned.iter(world).filter(|(_, state)| **state == CaptureState::Loading);
     let waiting = waiting.map(|(capture, _)| capture.0.id()).filter(|id| loaded.contains(*id));
     // Captures of later clips are on no entity yet, and timelines wait for them.
     let uploads = world.get_resource::<Uploads>();
     let is_awaited = |id: AssetId<GaussianCapture>| uploads.is_some_and(|uploads| uploads.awaits(id));
     let clips = clips(world, &players).into_iter().filter(|id| loaded.contains(*id) && is_awaited(*id));
-    let waiting = waiting.chain(clips);
+    let waiting = waiting.chain(clips).chain(coarse);
     // Of changed captures, the older version is drawn.
     let changed = world.get_resource::<CaptureStatistics>().map_or(0, CaptureStatistics::uploading_captures);
     waiting.map(|id| id.to_string()).chain((changed > 0).then(|| format!("{changed} changed captures"))).collect()

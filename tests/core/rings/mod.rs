@@ -32,12 +32,13 @@ const PLUGIN: &Order = &[
     ("asset", &["component"]),
     ("playback", &["component", "asset"]),
     ("render", &["component", "asset", "playback"]),
+    ("stream", &["component", "asset", "playback", "render"]),
     ("picker", &["component", "asset", "playback", "render"]),
-    ("pbr", &["component", "asset", "playback", "render"]),
+    ("pbr", &["component", "asset", "playback", "render", "stream"]),
     ("stereo", &["component", "asset", "playback", "render"]),
     ("picking_backend", &["component", "asset", "playback", "render", "picker"]),
-    ("inspector", &["component", "asset", "playback", "render", "pbr", "picker", "stereo"]),
-    ("testing", &["component", "asset", "playback", "render", "picker", "stereo"]),
+    ("inspector", &["component", "asset", "playback", "render", "stream", "pbr", "picker", "stereo"]),
+    ("testing", &["component", "asset", "playback", "render", "stream", "picker", "stereo"]),
 ];
 
 #[test]

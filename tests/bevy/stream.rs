@@ -1,0 +1,645 @@
+//! Captures in chunk files: what is loaded, drawn and given up while a capture is played.
+//!
+//! In: a synthetic capture that `gs4d split` has cut, from an asset source whose reads the tests let through, fail and
+//! count. Out: proof that a capture is ready with its coarse picture and then becomes whole, that its settings decide
+//! what is drawn while files are missing, that budgets are kept, that files are loaded again after failures and reloads,
+//! that the entities of files follow that of the capture, and that a whole stream has the picture of the joined capture.
+//! Only the last needs a GPU.
+
+use crate::support::event_log::{debug, record, take_events};
+use crate::support::fixtures::synthetic_eye;
+use crate::support::gated_files::GatedFiles;
+use crate::support::offscreen_app::{self, picture, run_frames, spawn_camera};
+use crate::support::playback_app::{self, change, get, pass};
+use crate::support::waiting::wait_until;
+use bevy::camera::visibility::RenderLayers;
+use bevy::prelude::*;
+use bevy::time::TimeUpdateStrategy;
+use bevy_gs4d::codec::stream::StreamSchedule;
+use bevy_gs4d::codec::{self, ReadOptions};
+use bevy_gs4d::playback::{ClipFade, FollowsClock, PlaybackClock};
+use bevy_gs4d::prelude::*;
+use bevy_gs4d::render::CaptureSettings;
+use bevy_gs4d::scene::ChunkTable;
+use bevy_gs4d::stream::{
+    CaptureBuffered, CaptureBuffering, CapturePart, CaptureStalled, CaptureStreamSettings, CaptureStreamState,
+    OnUnderrun, StreamBudget,
+};
+use image::{Rgba, RgbaImage};
+use std::collections::{BTreeMap, BTreeSet};
+use std::ffi::OsString;
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+use std::sync::{Arc, LazyLock};
+use std::time::Duration;
+
+/// Duration of the capture.
+const SECONDS: f32 = 4.0;
+/// A time in the last stretch of the capture, half a second long.
+const LATE: f32 = 3.6;
+/// The path of the index in apps without a renderer.
+const INDEX: &str = "gated://index.gs4d";
+
+/// A capture in chunk files.
+struct Split {
+    /// The index and the chunk files, by name.
+    files: BTreeMap<String, Vec<u8>>,
+    /// The capture that `gs4d join` makes of them.
+    joined: Vec<u8>,
+    table: Arc<ChunkTable>,
+}
+
+static SPLIT: LazyLock<Split> = LazyLock::new(|| {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let [whole, chunks, joined] = ["whole.gs4d", "chunks", "joined.gs4d"].map(|name| folder.path().join(name));
+    let words = |words: &str| words.split_whitespace().map(OsString::from).collect::<Vec<_>>();
+    let file = |path: &Path| vec![path.as_os_str().to_owned()];
+    let synthetic = words("--count 12000 --duration 4 --sh-degree 0 --level 1");
+    run(&[words("synth"), file(&whole), synthetic].concat());
+    let layers = words("--chunk 0.5 --layers 25,25,50 --level 1");
+    run(&[words("split"), file(&whole), words("-o"), file(&chunks), layers].concat());
+    run(&[words("join"), file(&chunks), words("-o"), file(&joined), words("--level 1")].concat());
+    let read = |path: &Path| fs::read(path).expect("the command has written it");
+    let entries = fs::read_dir(&chunks).expect("the command has made it").map(|entry| entry.expect("readable"));
+    let files = entries.map(|entry| (entry.file_name().to_string_lossy().into_owned(), read(&entry.path()))).collect();
+    let index = codec::load(&chunks.join(ChunkTable::INDEX), &ReadOptions::default()).expect("a package");
+    let table = index.chunks.expect("an index has a table");
+    assert_eq!((table.stretches, table.layers()), (8, 3), "stretches of half a second, in three layers");
+    Split { files, joined: read(&joined), table }
+});
+
+/// Runs the `gs4d` command.
+fn run(arguments: &[OsString]) {
+    let output = Command::new(env!("CARGO_BIN_EXE_gs4d")).args(arguments).output().expect("the command starts");
+    assert!(output.status.success(), "gs4d {arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+}
+
+/// Returns the numbers of all chunk files.
+fn all_files() -> BTreeSet<usize> {
+    (0..SPLIT.table.files.len()).collect()
+}
+
+/// Returns the numbers of the files that have Gaussians of a time.
+fn needed(seconds: f32) -> BTreeSet<usize> {
+    StreamSchedule::new(SPLIT.table.clone(), SECONDS.into()).needed_at(seconds.into()).collect()
+}
+
+/// Returns those of them that have the most important Gaussians.
+fn coarse(seconds: f32) -> BTreeSet<usize> {
+    needed(seconds).into_iter().filter(|file| SPLIT.table.files[*file].layer == 0).collect()
+}
+
+/// Returns the bytes of the Gaussians of files on the GPU.
+fn gpu_bytes(files: &BTreeSet<usize>) -> u64 {
+    files.iter().map(|file| SPLIT.table.gpu_bytes(*file)).sum()
+}
+
+fn name(file: usize) -> String {
+    ChunkTable::file_name(file, SPLIT.table.files.len())
+}
+
+fn names(files: BTreeSet<usize>) -> impl Iterator<Item = String> {
+    files.into_iter().map(name)
+}
+
+/// An app without a renderer, and the files that it loads. At first only the index is let through.
+struct Stage {
+    app: App,
+    gate: GatedFiles,
+}
+
+impl Stage {
+    fn new() -> Self {
+        let gate = GatedFiles::new(&SPLIT.files);
+        gate.let_through([ChunkTable::INDEX.to_owned()]);
+        let mut app = App::new();
+        gate.add_to(&mut app);
+        app.add_plugins((MinimalPlugins, AssetPlugin::default(), GaussianCapturePlugins));
+        // Tests also make steps longer than Bevy's limit of a quarter of a second.
+        app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::MAX);
+        record::<CaptureReady>(&mut app, Last);
+        record::<CaptureFailed>(&mut app, Last);
+        record::<CaptureBuffering>(&mut app, Last);
+        record::<CaptureBuffered>(&mut app, Last);
+        record::<CaptureStalled>(&mut app, Last);
+        record::<PlaybackStarted>(&mut app, Last);
+        record::<PlaybackSeeked>(&mut app, Last);
+        record::<PlaybackLooped>(&mut app, Last);
+        // No time passes in the first update, with any strategy.
+        pass(&mut app, 0.0);
+        Self { app, gate }
+    }
+
+    /// Spawns an entity with the capture.
+    fn spawn(&mut self, bundle: impl Bundle) -> Entity {
+        let capture = self.app.world().resource::<AssetServer>().load(INDEX);
+        self.app.world_mut().spawn((GaussianCapture3d(capture), bundle)).id()
+    }
+
+    /// Spawns a playing entity with the capture, and waits until it has all Gaussians of its first moment.
+    fn whole(&mut self) -> Entity {
+        self.gate.open();
+        let entity = self.spawn(Playback::default());
+        until(&mut self.app, "a whole picture", |app| stream(app, entity).is_whole());
+        entity
+    }
+}
+
+/// Updates until a condition holds, without time passing.
+fn until(app: &mut App, what: &str, so: impl Fn(&App) -> bool) {
+    app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::ZERO));
+    wait_until(app, what, so, App::update);
+}
+
+/// Returns the state of a stream; the default if the entity has none.
+fn stream(app: &App, entity: Entity) -> CaptureStreamState {
+    app.world().get::<CaptureStreamState>(entity).cloned().unwrap_or_default()
+}
+
+fn time(app: &App, entity: Entity) -> f32 {
+    get::<Playback>(app, entity).time
+}
+
+fn seek(app: &mut App, entity: Entity, seconds: f32) {
+    change::<Playback>(app, entity, |playback| playback.seek(seconds));
+}
+
+fn captures(app: &App) -> &Assets<GaussianCapture> {
+    app.world().resource()
+}
+
+/// Returns the table of the index of an entity as it is loaded now.
+fn table(app: &App, entity: Entity) -> Option<Arc<ChunkTable>> {
+    captures(app).get(&get::<GaussianCapture3d>(app, entity).0)?.scene().chunks.clone()
+}
+
+/// Returns the number of parts in the world.
+fn count_parts(app: &App) -> usize {
+    app.world().try_query::<&CapturePart>().map_or(0, |mut parts| parts.iter(app.world()).count())
+}
+
+/// Returns the parts of an entity.
+fn children(app: &App, entity: Entity) -> Vec<Entity> {
+    let children = app.world().get::<Children>(entity).into_iter().flatten().copied();
+    children.filter(|child| app.world().get::<CapturePart>(*child).is_some()).collect()
+}
+
+/// Returns the parts of an entity: the numbers of their files, ascending, with the times of their playback.
+fn parts(app: &App, entity: Entity) -> Vec<(usize, f32)> {
+    let server = app.world().resource::<AssetServer>();
+    let part = |child: Entity| {
+        let file = get::<CapturePart>(app, child).file as usize;
+        let path = server.get_path(get::<GaussianCapture3d>(app, child).0.id()).map(|path| path.to_string());
+        assert_eq!(path, Some(format!("gated://{}", name(file))), "part {file} has the file of this number");
+        (file, time(app, child))
+    };
+    let mut parts: Vec<(usize, f32)> = children(app, entity).into_iter().map(part).collect();
+    parts.sort_by_key(|(file, _)| *file);
+    parts
+}
+
+/// Returns parts of these files at a time.
+fn drawn(files: BTreeSet<usize>, seconds: f32) -> Vec<(usize, f32)> {
+    files.into_iter().map(|file| (file, seconds)).collect()
+}
+
+/// Returns the events since the last call whose names begin in this way.
+fn events(app: &mut App, name: &str) -> Vec<String> {
+    take_events(app).into_iter().filter(|event| event.starts_with(name)).collect()
+}
+
+/// Returns the messages about streaming since the last call.
+fn said(app: &mut App) -> Vec<String> {
+    take_events(app)
+        .into_iter()
+        .filter(|event| ["CaptureBuffer", "CaptureStalled"].iter().any(|name| event.starts_with(name)))
+        .collect()
+}
+
+#[test]
+fn a_capture_is_ready_once_its_coarse_picture_is_there_and_then_becomes_whole() {
+    let mut stage = Stage::new();
+    let entity = stage.spawn(Playback::default());
+    let mut files = coarse(0.0);
+    let count = files.len();
+    let last = files.pop_last().expect("every moment has Gaussians");
+    stage.gate.let_through(names(files));
+    until(&mut stage.app, "all files but one", |app| {
+        stream(app, entity).resident == count - 1 && stage.gate.reads().contains_key(&name(last))
+    });
+    for _ in 0..3 {
+        pass(&mut stage.app, 0.0);
+        let state = stream(&stage.app, entity);
+        assert_eq!(get::<CaptureState>(&stage.app, entity), CaptureState::Loading, "without one file: {state:?}");
+        assert_eq!((state.seconds, state.is_coarse, count_parts(&stage.app)), (None, false, 0), "nothing is drawn");
+    }
+    assert_eq!(events(&mut stage.app, "CaptureReady"), [""; 0], "nothing is ready");
+
+    stage.gate.let_through([name(last)]);
+    until(&mut stage.app, "a coarse picture", |app| get::<CaptureState>(app, entity) == CaptureState::Ready);
+    let state = stream(&stage.app, entity);
+    assert_eq!((state.seconds, state.is_coarse, state.is_whole()), (Some(0.0), true, false), "coarse: {state:?}");
+    assert_eq!((state.needed, state.resident), (needed(0.0).len(), count), "the files of layer 0: {state:?}");
+    assert!(state.share > 0.0 && state.share < 1.0, "a share of the Gaussians: {state:?}");
+    assert_eq!(parts(&stage.app, entity), drawn(coarse(0.0), 0.0), "their parts");
+    let ready = debug(&CaptureReady { entity, capture: get::<GaussianCapture3d>(&stage.app, entity).0.id() });
+    let said = events(&mut stage.app, "CaptureReady").into_iter().filter(|event| *event == ready).count();
+    assert_eq!(said, 1, "one message names the entity of the game");
+
+    stage.gate.open();
+    until(&mut stage.app, "a whole picture", |app| stream(app, entity).is_whole());
+    assert_eq!(parts(&stage.app, entity), drawn(needed(0.0), 0.0), "a part for each file of the first moment");
+    assert_eq!(stream(&stage.app, entity).share, 1.0, "all Gaussians");
+    assert_eq!(events(&mut stage.app, &ready), [""; 0], "the capture is ready once");
+}
+
+#[test]
+fn parts_are_those_of_the_time_and_have_the_time_of_their_parent() {
+    let mut stage = Stage::new();
+    let entity = stage.whole();
+    let count = SPLIT.table.files.len() + 1;
+    until(&mut stage.app, "all files", |app| captures(app).len() == count);
+    let mut turns = 0;
+    for _ in 0..14 {
+        let before = time(&stage.app, entity);
+        pass(&mut stage.app, 0.31);
+        let now = time(&stage.app, entity);
+        turns += usize::from(now < before);
+        let state = stream(&stage.app, entity);
+        assert!(state.is_whole() && state.seconds == Some(now), "everything is there at {now} s: {state:?}");
+        assert_eq!(parts(&stage.app, entity), drawn(needed(now), now), "parts at {now} s");
+        assert_eq!(count_parts(&stage.app), needed(now).len(), "and no others");
+    }
+    assert_eq!(turns, 1, "the capture loops");
+    seek(&mut stage.app, entity, LATE);
+    pass(&mut stage.app, 0.0);
+    assert_eq!(parts(&stage.app, entity), drawn(needed(LATE), LATE), "parts after a jump, in the same frame");
+    let played = events(&mut stage.app, "Playback");
+    let of_parent = |event: &String| event.contains(&format!("entity: {entity:?}"));
+    assert!(played.len() >= 3 && played.iter().all(of_parent), "no message about playing names a part: {played:?}");
+}
+
+#[test]
+fn no_time_passes_before_the_first_picture() {
+    let mut stage = Stage::new();
+    let entity = stage.spawn(Playback::default());
+    // Time passes from the beginning, also in the frame in which the index arrives.
+    let is_there = |app: &App| stream(app, entity).needed > 0;
+    wait_until(&mut stage.app, "the index", is_there, |app| pass(app, 0.25));
+    for _ in 0..4 {
+        pass(&mut stage.app, 0.25);
+    }
+    assert_eq!(time(&stage.app, entity), 0.0, "playback waits at its beginning");
+    assert_eq!((stream(&stage.app, entity).seconds, count_parts(&stage.app)), (None, 0), "nothing is drawn");
+    let buffering = debug(&CaptureBuffering { entity, seconds: 0.0 });
+    assert_eq!(said(&mut stage.app), [buffering], "it buffers, and has nothing to stall");
+    stage.gate.open();
+    until(&mut stage.app, "a picture", |app| stream(app, entity).is_coarse);
+    assert_eq!(said(&mut stage.app), [debug(&CaptureBuffered { entity, seconds: 0.0 })], "the picture is there");
+    pass(&mut stage.app, 0.25);
+    assert_eq!(time(&stage.app, entity), 0.25, "time passes with the first picture");
+}
+
+#[test]
+fn settings_decide_what_is_drawn_while_the_most_important_gaussians_are_missing() {
+    assert!(!coarse(LATE).is_subset(&coarse(0.0)), "other files are needed later");
+    for on_underrun in [OnUnderrun::Stall, OnUnderrun::Hold, OnUnderrun::Coarse] {
+        let mut stage = Stage::new();
+        let app = &mut stage.app;
+        stage.gate.let_through(names(coarse(0.0)));
+        let capture = app.world().resource::<AssetServer>().load(INDEX);
+        let settings = CaptureStreamSettings { on_underrun, ..default() };
+        let entity = app.world_mut().spawn((GaussianCapture3d(capture), settings)).id();
+        until(app, "the first picture", |app| stream(app, entity).is_coarse);
+        let [buffering, buffered] =
+            [debug(&CaptureBuffering { entity, seconds: 0.0 }), debug(&CaptureBuffered { entity, seconds: 0.0 })];
+        assert_eq!(said(app), [buffering, buffered], "{on_underrun:?}: the first picture");
+
+        seek(app, entity, LATE);
+        pass(app, 0.02);
+        let then = time(app, entity);
+        for _ in 0..5 {
+            pass(app, 0.02);
+        }
+        let (now, state) = (time(app, entity), stream(app, entity));
+        let stalls = on_underrun == OnUnderrun::Stall;
+        let mut expected = vec![debug(&CaptureBuffering { entity, seconds: then })];
+        expected.extend(stalls.then(|| debug(&CaptureStalled { entity, seconds: then })));
+        assert_eq!(said(app), expected, "{on_underrun:?}: each message once");
+        assert_eq!((state.is_coarse, now > then), (false, !stalls), "{on_underrun:?}: {then} s to {now} s, {state:?}");
+        let (seconds, files) = match on_underrun {
+            OnUnderrun::Coarse => (now, &coarse(0.0) & &needed(now)),
+            _ => (0.0, coarse(0.0)),
+        };
+        assert_eq!(state.seconds, Some(seconds), "{on_underrun:?}: the time that is drawn");
+        assert!(!files.is_empty(), "{on_underrun:?}: something is drawn");
+        assert_eq!(parts(app, entity), drawn(files, seconds), "{on_underrun:?}: the parts that are drawn");
+
+        stage.gate.open();
+        until(app, "a coarse picture", |app| stream(app, entity).is_coarse);
+        assert_eq!(said(app), [debug(&CaptureBuffered { entity, seconds: now })], "{on_underrun:?}: it has arrived");
+        assert_eq!(stream(app, entity).seconds, Some(now), "{on_underrun:?}: the time of the playback is drawn");
+        pass(app, 0.02);
+        let later = time(app, entity);
+        assert!(later > now, "{on_underrun:?}: time passes");
+        assert!(parts(app, entity).iter().all(|(_, part)| *part == later), "{on_underrun:?}: the parts have that time");
+    }
+}
+
+/// Checks that a single stream is within its budget.
+fn check_budget(app: &App, entity: Entity) {
+    let (state, budget) = (stream(app, entity), app.world().resource::<StreamBudget>());
+    assert!(state.gpu_bytes <= budget.gpu_bytes, "the memory on the GPU is kept: {state:?}, {budget:?}");
+    assert!(state.requests <= budget.requests as usize, "the number of requests is kept: {state:?}, {budget:?}");
+    let loaded: usize = captures(app).iter().map(|(_, capture)| capture.scene().len()).sum();
+    let bytes = loaded as u64 * u64::from(SPLIT.table.gaussian_bytes);
+    assert!(bytes <= budget.gpu_bytes, "{loaded} Gaussians are in memory, of {bytes} bytes: {budget:?}");
+}
+
+#[test]
+fn a_stream_stays_within_its_budget_and_is_coarse_after_every_jump() {
+    let all = gpu_bytes(&all_files());
+    let middle = |stretch: u32| (stretch as f32 + 0.5) * SECONDS / SPLIT.table.stretches as f32;
+    let most_coarse = (0..SPLIT.table.stretches).map(|stretch| gpu_bytes(&coarse(middle(stretch)))).max();
+    // About a third, and the most important Gaussians of every moment.
+    let bytes = most_coarse.expect("stretches").max(all / 3);
+    assert!(bytes * 2 < all, "{bytes} of {all} bytes are not even half");
+    let mut stage = Stage::new();
+    stage.gate.open();
+    stage.app.insert_resource(StreamBudget { gpu_bytes: bytes, requests: 2, ..default() });
+    let entity = stage.spawn(Playback::default());
+    // The last is just before the end of the loop: what is played next is all there.
+    let jumps = (0..18).map(|jump| jump as f32 * 2.472 % SECONDS).chain([0.1, 3.7]);
+    for seconds in jumps {
+        seek(&mut stage.app, entity, seconds);
+        for _ in 0..10 {
+            pass(&mut stage.app, 0.02);
+            check_budget(&stage.app, entity);
+        }
+        let rests = |app: &App| stream(app, entity).is_coarse && stream(app, entity).requests == 0;
+        wait_until(&mut stage.app, &format!("a coarse picture after a jump to {seconds} s"), rests, |app| {
+            pass(app, 0.0);
+            check_budget(app, entity);
+        });
+    }
+}
+
+#[test]
+fn a_file_that_lands_after_its_capture_was_removed_is_ignored() {
+    let mut stage = Stage::new();
+    let entity = stage.spawn(Playback::default());
+    until(&mut stage.app, "requests", |app| stream(app, entity).requests > 0 && stage.gate.reads().len() > 1);
+    stage.app.world_mut().despawn(entity);
+    for _ in 0..3 {
+        pass(&mut stage.app, 0.0);
+    }
+    assert!(captures(&stage.app).is_empty(), "the index has been dropped");
+    stage.gate.open();
+    for _ in 0..50 {
+        std::thread::sleep(Duration::from_millis(2));
+        pass(&mut stage.app, 0.0);
+        assert_eq!((captures(&stage.app).len(), count_parts(&stage.app)), (0, 0), "nothing is loaded, nothing drawn");
+    }
+    let again = stage.whole();
+    assert_eq!(parts(&stage.app, again), drawn(needed(0.0), 0.0), "another entity has its parts");
+    pass(&mut stage.app, 0.25);
+    assert_eq!(time(&stage.app, again), 0.25, "it plays");
+    stage.app.world_mut().despawn(again);
+    until(&mut stage.app, "all files are dropped", |app| captures(app).is_empty());
+    assert_eq!(count_parts(&stage.app), 0, "parts are despawned with their parent");
+}
+
+#[test]
+fn two_entities_of_one_capture_share_its_files() {
+    let mut stage = Stage::new();
+    stage.gate.open();
+    let times = [0.2, LATE];
+    let entities = times.map(|seconds| stage.spawn(Playback::paused_at(seconds)));
+    let count = SPLIT.table.files.len() + 1;
+    until(&mut stage.app, "both", |app| {
+        entities.iter().all(|entity| stream(app, *entity).is_whole()) && captures(app).len() == count
+    });
+    for (entity, seconds) in entities.into_iter().zip(times) {
+        assert_eq!(parts(&stage.app, entity), drawn(needed(seconds), seconds), "the parts of {seconds} s");
+        assert_eq!(stream(&stage.app, entity).seconds, Some(seconds), "its own time");
+    }
+    seek(&mut stage.app, entities[1], 1.7);
+    pass(&mut stage.app, 0.0);
+    assert_eq!(parts(&stage.app, entities[0]), drawn(needed(0.2), 0.2), "the first stays");
+    assert_eq!(parts(&stage.app, entities[1]), drawn(needed(1.7), 1.7), "the second has jumped");
+    stage.app.world_mut().despawn(entities[0]);
+    pass(&mut stage.app, 0.0);
+    assert_eq!(parts(&stage.app, entities[1]), drawn(needed(1.7), 1.7), "the second stays");
+    let once: BTreeMap<String, usize> = SPLIT.files.keys().map(|name| (name.clone(), 1)).collect();
+    assert_eq!(stage.gate.reads(), once, "each file is read once");
+}
+
+#[test]
+fn a_file_that_cannot_be_read_is_tried_again() {
+    let mut stage = Stage::new();
+    stage.gate.fail_once(names(all_files()));
+    let entity = stage.whole();
+    let failures = stream(&stage.app, entity).failures;
+    assert!(failures >= needed(0.0).len() as u64, "every failure is counted: {failures}");
+    let reads = stage.gate.reads();
+    for file in needed(0.0) {
+        assert_eq!(reads.get(&name(file)), Some(&2), "file {file} is read again");
+    }
+    pass(&mut stage.app, 0.0);
+    assert_eq!(get::<CaptureState>(&stage.app, entity), CaptureState::Ready, "the capture is ready");
+    assert_eq!(events(&mut stage.app, "CaptureFailed"), [""; 0], "and has not failed");
+    assert_eq!(parts(&stage.app, entity), drawn(needed(0.0), 0.0), "its parts");
+}
+
+#[test]
+fn a_capture_whose_index_is_loaded_again_becomes_whole_again() {
+    let mut stage = Stage::new();
+    stage.gate.let_through(names(coarse(0.0)));
+    let entity = stage.spawn(Playback::default());
+    until(&mut stage.app, "a coarse picture", |app| stream(app, entity).is_coarse);
+    let before = table(&stage.app, entity).expect("the index is loaded");
+    stage.app.world().resource::<AssetServer>().reload(INDEX);
+    until(&mut stage.app, "the index", |app| table(app, entity).is_some_and(|table| !Arc::ptr_eq(&table, &before)));
+    stage.gate.open();
+    until(&mut stage.app, "a whole picture", |app| stream(app, entity).is_whole());
+    assert_eq!(parts(&stage.app, entity), drawn(needed(0.0), 0.0), "the parts");
+    let reads = stage.gate.reads();
+    for file in coarse(0.0) {
+        assert_eq!(reads.get(&name(file)), Some(&2), "file {file} is read again: it may have changed with the index");
+    }
+    pass(&mut stage.app, 0.0);
+    assert_eq!(get::<CaptureState>(&stage.app, entity), CaptureState::Ready, "the capture is ready");
+    pass(&mut stage.app, 0.25);
+    assert_eq!(time(&stage.app, entity), 0.25, "it plays");
+}
+
+#[test]
+fn a_stream_ends_with_its_component() {
+    let mut stage = Stage::new();
+    let entity = stage.whole();
+    stage.app.world_mut().entity_mut(entity).remove::<GaussianCapture3d>();
+    pass(&mut stage.app, 0.0);
+    assert_eq!(count_parts(&stage.app), 0, "no parts");
+    assert!(stage.app.world().get::<CaptureStreamState>(entity).is_none(), "no state");
+    until(&mut stage.app, "all files are dropped", |app| captures(app).is_empty());
+}
+
+#[test]
+fn a_stream_ends_with_another_capture() {
+    let mut stage = Stage::new();
+    let app = &mut stage.app;
+    stage.gate.let_through(names(coarse(0.0)));
+    let index: Handle<GaussianCapture> = app.world().resource::<AssetServer>().load(INDEX);
+    let settings = CaptureStreamSettings { on_underrun: OnUnderrun::Stall, ..default() };
+    let entity = app.world_mut().spawn((GaussianCapture3d(index.clone()), settings)).id();
+    until(app, "a coarse picture", |app| stream(app, entity).is_coarse);
+    seek(app, entity, LATE);
+    for _ in 0..3 {
+        pass(app, 0.02);
+    }
+    let stalled = time(app, entity);
+    assert!(count_parts(app) > 0 && !stream(app, entity).is_coarse, "it stalls at {stalled} s");
+
+    let other = playback_app::capture(app, 8.0, 4);
+    app.world_mut().entity_mut(entity).insert(GaussianCapture3d(other));
+    pass(app, 0.0);
+    assert_eq!(count_parts(app), 0, "no parts");
+    assert!(app.world().get::<CaptureStreamState>(entity).is_none(), "no state");
+    until(app, "the files are dropped", |app| captures(app).len() == 2);
+    assert_eq!(get::<CaptureState>(app, entity), CaptureState::Ready, "the other capture is ready");
+    pass(app, 0.25);
+    assert!(time(app, entity) > stalled, "its time passes: {stalled} s to {} s", time(app, entity));
+
+    stage.gate.open();
+    app.world_mut().entity_mut(entity).insert(GaussianCapture3d(index));
+    until(app, "the stream again", |app| stream(app, entity).is_whole());
+    let now = time(app, entity);
+    assert_eq!(parts(app, entity), drawn(needed(now), now), "the parts of {now} s");
+}
+
+type Looks = (Option<CaptureSettings>, Option<RenderLayers>, Option<ClipFade>);
+
+/// Checks that each part of an entity has these components.
+fn check_looks(app: &App, entity: Entity, (settings, layers, fade): &Looks, what: &str) {
+    let parts = children(app, entity);
+    assert!(!parts.is_empty(), "{what}: there are parts");
+    for part in parts {
+        let world = app.world();
+        assert_eq!(world.get::<CaptureSettings>(part).copied(), *settings, "{what}: the settings");
+        assert_eq!(world.get::<RenderLayers>(part), layers.as_ref(), "{what}: the layers");
+        assert_eq!(world.get::<ClipFade>(part).copied(), *fade, "{what}: the fade");
+    }
+}
+
+#[test]
+fn parts_take_over_the_settings_of_their_parent() {
+    let mut stage = Stage::new();
+    let entity = stage.whole();
+    let app = &mut stage.app;
+    let count = SPLIT.table.files.len() + 1;
+    until(app, "all files", |app| captures(app).len() == count);
+    check_looks(app, entity, &(Some(CaptureSettings::default()), None, None), "as they were spawned");
+    let (settings, layers, fade) =
+        (CaptureSettings { opacity: 0.5, ..default() }, RenderLayers::layer(3), ClipFade(0.25));
+    app.world_mut().entity_mut(entity).insert((settings, layers.clone(), fade));
+    pass(app, 0.0);
+    let all = (Some(settings), Some(layers.clone()), Some(fade));
+    check_looks(app, entity, &all, "in the frame of the change");
+    let before: BTreeSet<Entity> = children(app, entity).into_iter().collect();
+    seek(app, entity, LATE);
+    pass(app, 0.0);
+    check_looks(app, entity, &all, "after a jump");
+    assert!(children(app, entity).iter().any(|part| !before.contains(part)), "some of the parts are new");
+    change::<CaptureSettings>(app, entity, |settings| settings.opacity = 1.0);
+    app.world_mut().entity_mut(entity).remove::<(RenderLayers, ClipFade)>();
+    pass(app, 0.0);
+    check_looks(app, entity, &(Some(CaptureSettings::default()), None, None), "without them");
+}
+
+#[test]
+fn a_stream_follows_a_clock() {
+    let mut stage = Stage::new();
+    stage.gate.open();
+    let mut clock = PlaybackClock::manual();
+    clock.set(1.25);
+    let clock = stage.app.world_mut().spawn(clock).id();
+    let entity = stage.spawn(FollowsClock(clock));
+    let is_at = |app: &App, seconds: f32| {
+        let state = stream(app, entity);
+        state.is_whole() && state.seconds == Some(seconds)
+    };
+    until(&mut stage.app, "the time of the clock", |app| is_at(app, 1.25));
+    assert_eq!(parts(&stage.app, entity), drawn(needed(1.25), 1.25), "the parts of that time");
+    change::<PlaybackClock>(&mut stage.app, clock, |clock| clock.seek(3.125));
+    pass(&mut stage.app, 0.25);
+    assert_eq!(time(&stage.app, entity), 3.125, "it follows the jump at once");
+    until(&mut stage.app, "the jump of the clock", |app| is_at(app, 3.125));
+    assert_eq!(parts(&stage.app, entity), drawn(needed(3.125), 3.125), "the parts after the jump");
+}
+
+#[test]
+fn parts_that_no_parent_knows_are_despawned() {
+    let mut stage = Stage::new();
+    let entity = stage.whole();
+    let world = stage.app.world_mut();
+    let other = world.spawn_empty().id();
+    let strays = [
+        world.spawn((CapturePart { file: 0 }, ChildOf(entity))).id(),
+        world.spawn((CapturePart { file: u32::MAX }, ChildOf(entity))).id(),
+        world.spawn((CapturePart { file: 0 }, ChildOf(other))).id(),
+        world.spawn(CapturePart { file: 0 }).id(),
+    ];
+    pass(&mut stage.app, 0.0);
+    let left = strays.map(|stray| stage.app.world().get_entity(stray).is_ok());
+    assert_eq!(left, [false; 4], "those of a stream, of another entity, and of none");
+    assert_eq!(parts(&stage.app, entity), drawn(needed(0.0), 0.0), "the parts of the stream stay");
+}
+
+/// Returns the pictures of an entity, paused at each of these times.
+fn pictures(app: &mut App, entity: Entity, times: [f32; 5], is_there: impl Fn(&App, f32) -> bool) -> Vec<RgbaImage> {
+    // The first makes the app ready for updates.
+    picture(app, 0.0);
+    let shot = |seconds: f32| {
+        seek(app, entity, seconds);
+        run_frames(app, 1);
+        wait_until(app, &format!("{seconds} s"), |app| is_there(app, seconds), |app| run_frames(app, 1));
+        picture(app, 0.0)
+    };
+    times.map(shot).into()
+}
+
+#[test]
+fn a_whole_stream_has_the_picture_of_the_joined_capture() {
+    let Some(mut app) = offscreen_app::app(UVec2::new(96, 72)) else { return };
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let joined = folder.path().join("joined.gs4d");
+    fs::write(&joined, &SPLIT.joined).expect("the folder can be written to");
+    for (name, bytes) in &SPLIT.files {
+        fs::write(folder.path().join(name), bytes).expect("the folder can be written to");
+    }
+    spawn_camera(&mut app, Msaa::Off, synthetic_eye());
+    let spawn = |app: &mut App, path: &Path| {
+        let capture = app.world().resource::<AssetServer>().load(path.to_owned());
+        app.world_mut().spawn((GaussianCapture3d(capture), Playback::paused_at(0.0))).id()
+    };
+    // The beginning, the end, the boundary of two stretches, and two others.
+    let times = [0.0, 1.3, 2.0, 2.77, SECONDS];
+    let entity = spawn(&mut app, &folder.path().join(ChunkTable::INDEX));
+    let streamed = pictures(&mut app, entity, times, |app, seconds| {
+        let state = stream(app, entity);
+        state.is_whole() && state.seconds == Some(seconds)
+    });
+    app.world_mut().despawn(entity);
+    let entity = spawn(&mut app, &joined);
+    let whole = pictures(&mut app, entity, times, |_, _| true);
+    for ((seconds, streamed), whole) in times.into_iter().zip(&streamed).zip(&whole) {
+        let bright = whole.pixels().filter(|pixel| pixel.0[..3].iter().any(|channel| *channel > 64)).count();
+        assert!(bright > 300, "the capture is visible at {seconds} s: {bright} bright pixels");
+        let apart = |(a, b): (&Rgba<u8>, &Rgba<u8>)| a.0.iter().zip(b.0).map(|(a, b)| a.abs_diff(b)).max();
+        let apart: Vec<u8> = streamed.pixels().zip(whole.pixels()).filter_map(apart).filter(|by| *by > 0).collect();
+        let (count, most) = (apart.len(), apart.iter().max().copied().unwrap_or_default());
+        assert_eq!(count, 0, "{count} pixels differ at {seconds} s, by at most {most} / 255");
+    }
+    assert_ne!(whole[0], whole[1], "the capture moves");
+}
