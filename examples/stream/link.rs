@@ -1,0 +1,151 @@
+//! A simulated link: an asset source whose files arrive with a delay and at a rate, or not at all.
+//!
+//! In: a folder, the quality of the link. Out: the asset source `link`, and what came over it. It is no network: bytes
+//! come from the disk and are held back until they would have arrived. A network also slows down and stops.
+
+use crate::figures::scattered;
+use crate::timer::Timer;
+use bevy::asset::AssetPath;
+use bevy::asset::io::file::FileAssetReader;
+use bevy::asset::io::{AssetReader, AssetReaderError, AssetSourceBuilder, PathStream, Reader, VecReader};
+use bevy::prelude::*;
+use std::fmt;
+use std::io::{Error, ErrorKind};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+/// How good a link is. Default: as good as the disk.
+#[derive(Debug, Default, Clone, Copy)]
+pub struct Quality {
+    /// Bits a second, for all requests together; `None`: no limit.
+    pub rate: Option<f64>,
+    /// Time from a request to its first byte.
+    pub latency: Duration,
+    /// The share of the requests that fail, 0 to 1.
+    pub lost: f64,
+}
+
+impl fmt::Display for Quality {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.rate.is_none() && self.latency.is_zero() && self.lost == 0.0 {
+            return f.write_str("no link: files come from the disk");
+        }
+        f.write_str("a simulated link: ")?;
+        match self.rate {
+            Some(rate) => write!(f, "{} Mbit/s", rate * 1e-6)?,
+            None => f.write_str("any rate")?,
+        }
+        write!(f, ", {} ms to the first byte, {} % lost", self.latency.as_secs_f64() * 1e3, self.lost * 1e2)
+    }
+}
+
+/// What has come over a link.
+#[derive(Debug, Default, Clone, Copy)]
+pub struct Traffic {
+    /// When the last byte of all requests so far arrives.
+    busy: Option<Instant>,
+    pub requests: u64,
+    /// Requests that failed on purpose.
+    pub lost: u64,
+    pub bytes: u64,
+}
+
+/// A link to the folder of a capture in chunk files: the plugin that adds the asset source, to be added before Bevy's
+/// `AssetPlugin`. Clones share the link.
+#[derive(Clone)]
+pub struct Link {
+    /// The index of the capture.
+    index: PathBuf,
+    quality: Quality,
+    timer: Timer,
+    traffic: Arc<Mutex<Traffic>>,
+}
+
+impl Link {
+    /// Returns a link to the folder of an index.
+    pub fn new(index: &Path, quality: Quality) -> Self {
+        Self { index: index.into(), quality, timer: Timer::start(), traffic: Arc::default() }
+    }
+
+    /// Returns the asset path of the index.
+    pub fn index(&self) -> AssetPath<'static> {
+        AssetPath::from(PathBuf::from(self.index.file_name().unwrap_or_default())).with_source("link")
+    }
+
+    /// Returns what has come over the link.
+    pub fn traffic(&self) -> Traffic {
+        *self.lock()
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Traffic> {
+        self.traffic.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Begins a request. Returns whether it fails; that for the index does not, since a game would ask again.
+    fn ask(&self, path: &Path) -> bool {
+        let mut traffic = self.lock();
+        traffic.requests += 1;
+        let is_index = self.index.file_name() == Some(path.as_os_str());
+        let is_lost = !is_index && scattered(traffic.requests) < self.quality.lost;
+        traffic.lost += u64::from(is_lost);
+        is_lost
+    }
+
+    /// Returns when the last byte arrives of a request that was sent at `asked`: requests wait for their first byte
+    /// side by side, and their bytes follow one another.
+    fn arrival(&self, asked: Instant, bytes: usize) -> Instant {
+        let mut traffic = self.lock();
+        let first = asked + self.quality.latency;
+        let begin = traffic.busy.map_or(first, |busy| busy.max(first));
+        let seconds = self.quality.rate.map_or(0.0, |rate| 8.0 * bytes as f64 / rate);
+        let last = begin + Duration::from_secs_f64(seconds);
+        traffic.busy = Some(last);
+        traffic.bytes += bytes as u64;
+        last
+    }
+}
+
+impl Plugin for Link {
+    fn build(&self, app: &mut App) {
+        let link = self.clone();
+        let folder = self.index.parent().map(Path::to_path_buf).unwrap_or_default();
+        let source = AssetSourceBuilder::new(move || {
+            Box::new(LinkReader { files: FileAssetReader::new(&folder), link: link.clone() })
+        });
+        app.register_asset_source("link", source);
+    }
+}
+
+/// Reads files over a link.
+struct LinkReader {
+    files: FileAssetReader,
+    link: Link,
+}
+
+impl AssetReader for LinkReader {
+    async fn read<'a>(&'a self, path: &'a Path) -> Result<impl Reader + 'a, AssetReaderError> {
+        let (link, asked) = (&self.link, Instant::now());
+        if link.ask(path) {
+            link.timer.wait_until(asked + link.quality.latency).await;
+            return Err(Error::new(ErrorKind::TimedOut, "the simulated link lost the request").into());
+        }
+        let mut bytes = Vec::new();
+        self.files.read(path).await?.read_to_end(&mut bytes).await?;
+        link.timer.wait_until(link.arrival(asked, bytes.len())).await;
+        Ok(VecReader::new(bytes))
+    }
+
+    /// There are no files of settings, so that nothing asks for them over the link.
+    async fn read_meta<'a>(&'a self, path: &'a Path) -> Result<impl Reader + 'a, AssetReaderError> {
+        Err::<VecReader, _>(AssetReaderError::NotFound(path.into()))
+    }
+
+    async fn read_directory<'a>(&'a self, path: &'a Path) -> Result<Box<PathStream>, AssetReaderError> {
+        self.files.read_directory(path).await
+    }
+
+    async fn is_directory<'a>(&'a self, path: &'a Path) -> Result<bool, AssetReaderError> {
+        self.files.is_directory(path).await
+    }
+}
