@@ -114,6 +114,47 @@ fn budget_writes_pictures() {
     draw("budget", &["--size", "160x90", "--copies", "2", "--settle", "4"], 2);
 }
 
+#[test]
+fn stream_measures_chunk_files_and_writes_pictures() {
+    if !has_gpu() {
+        no_gpu();
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = |name: &str| folder.path().join(name).to_str().expect("temporary folders have plain names").to_owned();
+    let [whole, chunks, target] = ["long.gs4d", "chunks", "pictures"].map(path);
+    for arguments in [
+        vec!["synth", whole.as_str(), "--count", "6000", "--duration", "4", "--sh-degree", "0"],
+        vec!["split", whole.as_str(), "-o", chunks.as_str(), "--chunk", "0.5"],
+    ] {
+        let output = Command::new(env!("CARGO_BIN_EXE_gs4d")).args(&arguments).output().expect("the command starts");
+        assert!(output.status.success(), "gs4d {arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    }
+    let index = Path::new(&chunks).join("index.gs4d");
+    let index = index.to_str().expect("temporary folders have plain names");
+    let measured = ["--link", "80", "--latency", "5", "--seconds", "1", "--size", "160x90", "--whole", whole.as_str()];
+    let output = run("stream", &[&[index, "--headless", target.as_str(), "--frames", "2"][..], &measured].concat());
+    let said = [&output.stdout, &output.stderr].map(|said| String::from_utf8_lossy(said).into_owned()).concat();
+    assert!(output.status.success(), "stream ended with {}:\n{said}", output.status);
+    let result = said.lines().find(|line| line.starts_with("result: "));
+    assert!(result.is_some_and(|result| result.contains(" failures=0")), "all figures are in one line:\n{said}");
+    assert!(said.contains("first picture (coarse)"), "the time of the first picture:\n{said}");
+    check("stream", &read(Path::new(&target)), 2);
+}
+
+#[test]
+fn stream_says_what_makes_an_index() {
+    for (arguments, named) in [(&[][..], "gs4d split"), (&["--link", "none"][..], "--link none")] {
+        let output = run("stream", arguments);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(!output.status.success(), "stream {arguments:?} fails");
+        assert!(said.contains(named) && !said.contains("panicked"), "stream {arguments:?} says what to do:\n{said}");
+    }
+    let output = run("stream", &["--help"]);
+    assert!(output.status.success(), "stream --help ends with {}", output.status);
+    assert!(String::from_utf8_lossy(&output.stdout).contains("--link MBIT"), "the help has the options");
+}
+
 /// Returns a folder with the assets of the crate, except that the captures are fully transparent. Their durations and
 /// bounds are unchanged.
 fn invisible() -> TempDir {
