@@ -115,6 +115,7 @@ fn budget_writes_pictures() {
 }
 
 #[test]
+#[ignore = "takes minutes; `.ci/full` runs it"]
 fn stream_measures_chunk_files_and_writes_pictures() {
     if !has_gpu() {
         no_gpu();
