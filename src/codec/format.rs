@@ -221,8 +221,13 @@ fn read_checkpoint(
     Ok(checkpoint::read_file(file, path, beside, options)?)
 }
 
-fn read_package(file: &mut Input, _: &Path, _: &dyn Beside, options: &ReadOptions) -> Result<Imported, CodecErrorKind> {
-    Ok(Imported { scene: package::read_with(file, options)?, lost: Vec::new() })
+fn read_package(
+    file: &mut Input,
+    _: &Path,
+    beside: &dyn Beside,
+    options: &ReadOptions,
+) -> Result<Imported, CodecErrorKind> {
+    Ok(Imported { scene: package::read_with(file, beside, options)?, lost: Vec::new() })
 }
 
 fn write_package(

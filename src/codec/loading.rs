@@ -13,7 +13,7 @@ use super::input::Input;
 use super::options::ReadOptions;
 use super::package::{self, PackageError, Reading};
 use super::read_frames;
-use crate::scene::{Conversion, GaussianScene, RuntimeScene};
+use crate::scene::{ChunkTable, Conversion, GaussianScene, RuntimeScene};
 use std::collections::BTreeMap;
 use std::io::{self, Cursor};
 use std::path::{Path, PathBuf};
@@ -22,7 +22,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 /// A file that is being read.
 ///
 /// A capture may consist of several files: the textures of a SOG, `cfg_args` of a checkpoint, the frames of a sequence
-/// ([`ReadOptions::sequence`]). [`wanted`](Self::wanted) names the next of them, and [`supply`](Self::supply) takes it.
+/// ([`ReadOptions::sequence`]), the index of a chunk file. [`wanted`](Self::wanted) names the next of them, and [`supply`](Self::supply) takes it.
 /// A program that supplies none reads captures of a single file.
 ///
 /// # Examples
@@ -76,6 +76,9 @@ impl Loading {
         let state = state.map_err(|kind| CodecError::at(&path, kind))?;
         let wanted = match &state {
             State::Frames(frames) => frames.last().and_then(|(name, _)| sequence::next(name)),
+            State::Package(reading) if reading.needs_codebooks() && options.codebooks.is_none() => {
+                Some(ChunkTable::INDEX.to_owned())
+            }
             _ => None,
         };
         let lost = if state.is_native() { options.without_effect() } else { None };
@@ -102,7 +105,7 @@ impl Loading {
                 if reading.advance(bytes)? {
                     State::Package(reading)
                 } else {
-                    State::converting(reading.finish_with(&self.options)?)?
+                    State::converting(package::finish_beside(*reading, &self.supplied, &self.options)?)?
                 }
             }
             State::Whole(found) => self.read_whole(found)?,

@@ -4,9 +4,10 @@
 //! interprets; an [`InvalidOption`] for a value that is invalid or contradicts the file.
 
 use crate::gaussian::{SMALLEST_CUTOFF, ShDirection};
-use crate::scene::{RotationConvention, TrainedCameras, UpAxis};
+use crate::scene::{ColorCodebooks, RotationConvention, TrainedCameras, UpAxis};
 use crate::view::RasterFov;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// Frames a second of sequences and clips that do not say it.
 pub(crate) const FPS: f32 = 30.0;
@@ -58,6 +59,10 @@ pub struct ReadOptions {
     /// Largest distance between a curved path and the straight pieces that replace it, relative to the middle scale of
     /// the Gaussian. Default: 0.25.
     pub tolerance: Option<f32>,
+    /// The codebooks of a chunk file whose colors are coded, which are in the index of its capture; no effect on other
+    /// files. Not a setting of a `.meta` file. Default: those of the file `index.gs4d` beside it.
+    #[serde(skip)]
+    pub codebooks: Option<Arc<ColorCodebooks>>,
 }
 
 /// An option whose value is invalid or contradicts the file.

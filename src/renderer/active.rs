@@ -3,7 +3,7 @@
 //! In: a capture with a temporal filter and a time. Out: the indices of the Gaussians that are active in the segment of
 //! that time, ascending, part by part. `activate` writes them only when the segment has changed.
 
-use super::capture::{Filter, GpuCapture};
+use super::capture::{Filter, GpuCapture, Prefix};
 use super::layout::{Activation, BLOCK, INSTANCE_STRIDE};
 use super::pipelines::Renderer;
 use wgpu::BufferUsages;
@@ -60,7 +60,7 @@ impl ActiveList {
                 let activation = Activation { count: part.count, first, filter_mode: filter.mode, segment };
                 let at = index as u64 * u64::from(INSTANCE_STRIDE);
                 queue.write_buffer(&self.uniforms, at, bytemuck::bytes_of(&activation));
-                first += filter.count(index, segment);
+                first += filter.count(index, segment, None);
             }
         }
         !self.recorded
@@ -87,17 +87,28 @@ impl ActiveList {
         }
     }
 
-    /// Returns the number of active Gaussians of a part.
-    pub(super) fn count(&self, filter: &Filter, part: usize) -> u32 {
-        self.segment.map_or(0, |segment| filter.count(part, segment))
+    /// Returns the number of active Gaussians of a part, or of those in a prefix.
+    fn count(&self, filter: &Filter, part: usize, prefix: Option<usize>) -> u32 {
+        self.segment.map_or(0, |segment| filter.count(part, segment, prefix))
     }
 }
 
-/// Returns the number of Gaussians of a part of a capture that are drawn: the active Gaussians with a list, otherwise all.
-pub(super) fn drawn_count(capture: &GpuCapture, part: usize, active: Option<&ActiveList>) -> u32 {
-    match (&capture.filter, active) {
-        (Some(filter), Some(active)) => active.count(filter, part),
-        _ => capture.parts[part].count,
+/// Returns the number of Gaussians of a part of a capture that its list has, or all without a list; of those in a prefix,
+/// if there is one.
+pub(super) fn listed_count(
+    capture: &GpuCapture,
+    part: usize,
+    active: Option<&ActiveList>,
+    prefix: Option<(usize, Prefix)>,
+) -> u32 {
+    let count = capture.parts[part].count;
+    match (&capture.filter, active, prefix) {
+        (Some(filter), Some(active), _) => active.count(filter, part, prefix.map(|(index, _)| index)),
+        (_, _, None) => count,
+        (_, _, Some((_, Prefix { end, .. }))) => {
+            let first: usize = capture.parts[..part].iter().map(|part| part.count as usize).sum();
+            end.saturating_sub(first).min(count as usize) as u32
+        }
     }
 }
 

@@ -2,6 +2,7 @@
 //!
 //! In: a device. Out: the compiled passes, and the bind group layouts of the passes, for the buffers of views and captures.
 
+use super::capture::SharedCodebooks;
 use super::compiling::Compiling;
 use super::device::GpuError;
 use super::device::WorkCounters;
@@ -34,6 +35,8 @@ pub struct Renderer {
     pub(super) no_list: wgpu::BindGroup,
     /// The working buffers that views share.
     pub(super) scratch: Scratch,
+    /// The codebooks that captures share.
+    pub(super) codebooks: SharedCodebooks,
     work: WorkCounters,
 }
 
@@ -61,6 +64,7 @@ impl Renderer {
             no_list: allocator.bind_group("gs4d no active list", &layouts.active, &[no_list.as_entire_binding()]),
             layouts,
             scratch: Scratch::default(),
+            codebooks: SharedCodebooks::default(),
             work,
         })
     }

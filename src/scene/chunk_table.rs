@@ -57,6 +57,8 @@ impl ChunkTable {
     pub const MOST_FILES: usize = 99_999;
     /// Most layers.
     pub const MOST_LAYERS: u32 = 16;
+    /// Most bytes of a Gaussian on the GPU: more than those of any form, with a temporal filter of any size.
+    pub const MOST_GAUSSIAN_BYTES: u32 = 1 << 14;
 
     /// Returns the name of a chunk file. `number` counts from 0.
     pub fn file_name(number: usize, of: usize) -> String {
@@ -107,12 +109,18 @@ impl ChunkTable {
         if self.gaussian_bytes == 0 {
             return Err("a table of chunk files whose Gaussians have no bytes");
         }
+        if self.gaussian_bytes > Self::MOST_GAUSSIAN_BYTES {
+            return Err("a table of chunk files whose Gaussians have more than 16384 bytes each");
+        }
         for ChunkFile { stretches: [first, last], layer, gaussians, bytes } in &self.files {
             if first > last || *last >= self.stretches {
                 return Err("a chunk file whose stretches of time do not exist, or are not in order");
             }
             if *layer >= Self::MOST_LAYERS {
                 return Err("a chunk file of a layer above 15");
+            }
+            if *gaussians == 0 {
+                return Err("a chunk file without Gaussians");
             }
             // Sums over all files stay below 2^64.
             if *gaussians > u64::from(u32::MAX) || *bytes > 1 << 40 {
@@ -159,12 +167,14 @@ mod tests {
     fn faulty_tables_are_refused() {
         assert_eq!(table().check(), Ok(()), "a good table");
         assert_eq!((table().gpu_bytes(1), table().gpu_bytes(3)), (800, 0), "bytes of a file on the GPU");
-        let faults: [fn(&mut ChunkTable); 7] = [
+        let faults: [fn(&mut ChunkTable); 9] = [
             |table| table.stretches = 0,
             |table| table.gaussian_bytes = 0,
+            |table| table.gaussian_bytes = 16_385,
             |table| table.files[0].stretches = [1, 0],
             |table| table.files[0].stretches = [3, 4],
             |table| table.files[0].layer = 16,
+            |table| table.files[0].gaussians = 0,
             |table| table.files[0].gaussians = u64::MAX,
             |table| table.files[0].bytes = u64::MAX,
         ];

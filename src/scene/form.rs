@@ -13,12 +13,13 @@
 //! Two values are derived from the form by an exhaustive `match`: the variant of `project` that draws it
 //! (`renderer::Storage::of`), and the form in the header of a package (`codec::package::StoredForm::of`).
 
-use super::packed::{CodedColors, PackedColors, PackedScene};
+use super::packed::{CodedColors, ColorCodebooks, PackedColors, PackedScene};
 use super::sliced::Sliced;
 use crate::gaussian::{Gaussian, Harmonics, InvalidGaussian, Lifespan, Model, Parameters};
 use glam::Vec3;
 use rayon::prelude::*;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// The Gaussians of a scene and their color.
 #[derive(Debug, Clone, PartialEq)]
@@ -124,6 +125,14 @@ impl SceneForm {
             Self::Ready(Form::Packed(PackedScene { colors: PackedColors::Coded(colors), .. })) => {
                 colors.truncate(degree, degree_t);
             }
+        }
+    }
+
+    /// Returns the codebooks of its colors; `None` if they are not coded.
+    pub fn codebooks(&self) -> Option<&Arc<ColorCodebooks>> {
+        match self {
+            Self::Trained(_) => None,
+            Self::Ready(form) => form.coded_colors().map(|colors| &colors.codebooks),
         }
     }
 

@@ -42,7 +42,7 @@ pub use filter::{ActiveSets, FilterKind, TemporalFilter};
 pub use form::{ColorDegrees, Form, SceneForm, Trained};
 pub use gaussian_scene::GaussianScene;
 pub use importances::Importances;
-pub use packed::{Bits, CodedColors, PackError, PackedColors, PackedScene, Packing};
+pub use packed::{Bits, CodedColors, ColorCodebooks, PackError, PackedColors, PackedScene, Packing, RunPart, Runs};
 pub use pick::{Pick, PickSettings};
 pub use provenance::{Origin, PlaybackHints, RotationConvention, TrainedCameras, TrainedWith, UpAxis};
 pub use runtime_scene::{Level, RuntimeScene};

@@ -2,7 +2,7 @@
 //!
 //! In: synthetic segments. Out: proof that a joined capture looks like each segment within its time and shows nothing of
 //! another one, that it is not larger than its segments, that its chunk files are the same capture and in their index,
-//! and that files which cannot be joined or split are refused with a remedy that works.
+//! also packed ones, and that files which cannot be joined or split are refused with a remedy that works.
 
 use crate::support::command::{arguments, folder, gs4d};
 use crate::support::folders::{contents, names};
@@ -181,6 +181,63 @@ fn chunks_are_in_layers_and_the_index_lists_them() {
     assert!(found >= 80.0, "the order of Gaussians changes no picture: {found} dB");
 }
 
+/// Writes a synthetic capture, compressed with the order of chunks of half a second. Returns the package.
+fn packed(folder: &TempDir, more: &[&str]) -> PathBuf {
+    let [whole, packed] = ["whole.gs4d", "packed.gs4d"].map(|name| folder.path().join(name));
+    gs4d(&arguments!["synth", &whole, "--count", "30000", "--duration", "2"]).text();
+    let order = arguments!["compress", &whole, &packed, "--chunk", "0.5", "--verify", "0"].to_vec();
+    gs4d(&[order, more.iter().map(Into::into).collect()].concat()).text();
+    packed
+}
+
+#[test]
+fn packed_chunks_are_the_package_as_it_was() {
+    let folder = folder();
+    for (name, colors) in [("coded", ["--codebooks", "64,64"]), ("whole", ["--quality", "visually-lossless"])] {
+        let package = packed(&folder, &[&colors[..], &["--layers", "10,40,50"]].concat());
+        let chunks = folder.path().join(name);
+        let report = gs4d(&arguments!["split", &package, "-o", &chunks, "--json"]).json();
+        let info = gs4d(&arguments!["info", &package, "--json"]).json();
+        assert_eq!((&report["stretches"], &report["layers"]), (&4.into(), &3.into()), "as it was compressed: {report}");
+        assert_eq!(report["gaussians"], info["gaussians"], "every Gaussian, with the fillers of blocks");
+        assert_eq!((&info["runs"]["stretches"], &info["runs"]["layers"]), (&4.into(), &3.into()), "the order: {info}");
+        let files: Vec<PathBuf> = contents(&chunks).into_keys().collect();
+        assert!(files.len() > 5, "several runs in three layers, and the index: {files:?}");
+        let bytes: u64 = files.iter().map(|file| size(file)).sum();
+        // Of 30,000 Gaussians the headers of the files are a large part.
+        assert!(bytes as f64 <= 1.2 * size(&package) as f64, "{name}: {bytes} of {} bytes", size(&package));
+
+        let (back, _) = joined(&folder, std::slice::from_ref(&chunks), "back.gs4d", &[]);
+        assert!(fs::read(&back).ok() == fs::read(&package).ok(), "{name}: the same bytes");
+        let alone = read(&files[0]);
+        let range = alone.len() < read(&package).len();
+        assert!(range && alone.chunks.is_none(), "a chunk file is a capture of some of the Gaussians");
+        if name == "coded" {
+            fs::remove_file(chunks.join("index.gs4d")).expect("the index is there");
+            gs4d(&arguments!["info", &files[0]]).must_fail("index.gs4d");
+        }
+    }
+}
+
+#[test]
+fn each_packed_gaussian_is_in_a_file_of_its_times() {
+    let folder = folder();
+    let package = packed(&folder, &["--codebooks", "64"]);
+    let chunks = folder.path().join("chunks");
+    let report = gs4d(&arguments!["split", &package, "-o", &chunks, "--json"]).json();
+    for chunk in report["chunks"].as_array().expect("chunks") {
+        let scene = read(Path::new(chunk["file"].as_str().expect("a path")));
+        let [first, last] = [0, 1].map(|end| chunk["times"][end].as_f64().expect("a time"));
+        let cutoff = scene.trained_with.marginal_cutoff;
+        for gaussian in scene.iter() {
+            let is_drawn = |time: f64| gaussian.opacity > 0.0 && gaussian.marginal(time as f32) > cutoff;
+            assert!(first <= 0.0 || !is_drawn(first - 1e-4), "alive before {first}: {gaussian:?}");
+            assert!(last >= 1.0 || !is_drawn(last + 1e-4), "alive after {last}: {gaussian:?}");
+        }
+    }
+    gs4d(&arguments!["split", &package, "-o", &chunks, "--chunk", "1"]).must_fail("--chunk has no effect on a packed");
+}
+
 #[test]
 fn what_cannot_be_joined_or_split_is_refused_with_a_remedy() {
     let folder = folder();
@@ -201,7 +258,7 @@ fn what_cannot_be_joined_or_split_is_refused_with_a_remedy() {
         join(&path(name)).must_fail(refusal);
         assert!(!out.exists(), "{name}: no output is written");
     }
-    gs4d(&arguments!["split", path("packed.gs4d"), "-o", path("chunks")]).must_fail("packed.gs4d: is packed");
+    gs4d(&arguments!["split", path("packed.gs4d"), "-o", path("chunks")]).must_fail("gs4d compress --chunk");
     gs4d(&arguments!["join", &parts[0], "-o", &out]).must_fail("part-0.gs4d: is one segment");
     gs4d(&arguments!["join", &parts[0], &parts[1], "-o", &parts[0]]).must_fail("the input itself");
     let overlap = gs4d(&arguments!["join", &parts[0], &parts[1], "-o", &out, "--keep-times"]);

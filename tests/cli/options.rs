@@ -38,6 +38,9 @@ const REFUSED: &[(&str, &str)] = &[
     ("compress a b --quality lossless --escape 0.1", "--escape has no effect with --quality lossless"),
     ("compress a b --quality lossless --color-step 0.1", "--color-step has no effect with --quality lossless"),
     ("compress a b --quality lossless --progressive", "--progressive has no effect with the quality lossless"),
+    ("compress a b --quality lossless --chunk 1", "--chunk has no effect with the quality lossless"),
+    ("compress a b --layers 50,50", "the following required arguments were not provided"),
+    ("compress a b --chunk 1 --progressive", "the argument '--chunk <SECONDS>' cannot be used with '--progressive'"),
     ("compress a b --quality lossless --codebooks 4", "--codebooks has no effect with --quality lossless"),
     ("compress a b --quality lossless --weights w.f32", "--weights has no effect with --quality lossless"),
     ("compress a b --codebooks 4 --color-step 0.1", "--color-step has no effect on colors that are coded by codebooks"),
@@ -167,7 +170,7 @@ const REFUSED: &[(&str, &str)] = &[
     // finetune
     ("finetune a -o o --data d --validation none --patience 3", "--patience has no effect without validation views"),
     ("finetune a -o o --data d --compress-steps 3", "the following required arguments were not provided"),
-    ("finetune a -o o --data d --progressive", "the following required arguments were not provided"),
+    ("finetune a -o o --data d --progressive", "--progressive has no effect without --compress"),
     (
         "finetune a -o o --data d --compress lossless --progressive",
         "--progressive has no effect with the quality lossless",
@@ -176,6 +179,8 @@ const REFUSED: &[(&str, &str)] = &[
         "finetune a -o o --data d --compress small --progressive --round-geometry",
         "the argument '--progressive' cannot be used with '--round-geometry'",
     ),
+    ("finetune a -o o --data d --layers 100", "the following required arguments were not provided"),
+    ("finetune a -o o --data d --chunk 1", "--chunk has no effect without --compress"),
     ("finetune a -o o --data d --round-geometry", "the following required arguments were not provided"),
     (
         "finetune a -o o --data d --compress visually-lossless --compress-steps 3",
@@ -186,6 +191,8 @@ const REFUSED: &[(&str, &str)] = &[
         "--round-geometry has no effect with a quality without codebooks",
     ),
     // bake
+    ("bake a -o o --data d --layers 100", "the following required arguments were not provided"),
+    ("bake a -o o --data d --quality lossless --chunk 2", "--chunk has no effect with the quality lossless"),
     ("bake a -o o --data d --quality lossless --progressive", "--progressive has no effect with the quality lossless"),
     (
         "bake a -o o --data d --no-fine-tune --steps 3",

@@ -7,9 +7,10 @@ use crate::support::coded_scene::coded_scene;
 use bevy_gs4d::codec::package::{self, PackageError, WriteSettings};
 use bevy_gs4d::gaussian::Harmonics;
 use bevy_gs4d::internal::scene::RECORD_WORDS;
-use bevy_gs4d::scene::{ActiveSets, CodedColors, Environment, Form, GaussianScene, RuntimeScene};
+use bevy_gs4d::scene::{ActiveSets, CodedColors, ColorCodebooks, Environment, Form, GaussianScene, RuntimeScene};
 use bevy_gs4d::scene::{PackedColors, PackedScene};
 use std::io::Cursor;
+use std::sync::Arc;
 
 const COUNT: usize = 600;
 
@@ -26,6 +27,10 @@ fn packed(scene: &mut RuntimeScene) -> &mut PackedScene {
 fn colors(scene: &mut RuntimeScene) -> &mut CodedColors {
     let PackedColors::Coded(colors) = &mut packed(scene).colors else { panic!("the colors are coded") };
     colors
+}
+
+fn codebooks(scene: &mut RuntimeScene) -> &mut ColorCodebooks {
+    Arc::make_mut(&mut colors(scene).codebooks)
 }
 
 fn sets(scene: &mut RuntimeScene, change: impl FnOnce(&mut Vec<u32>)) {
@@ -57,13 +62,13 @@ type Wrong = (&'static str, fn(&mut RuntimeScene));
 const WRONG: [Wrong; 27] = [
     ("code", |scene| colors(scene).records[COUNT - 1][1] |= 0xffff),
     ("code", |scene| colors(scene).records[300][1] |= 5 << 16),
-    ("codebook", |scene| colors(scene).entries[1] -= 1),
-    ("codebook", |scene| colors(scene).entries[0] = u32::MAX),
-    ("codebook", |scene| colors(scene).entries = vec![1; 5]),
-    ("codebook", |scene| shorten(&mut colors(scene).codebooks)),
-    ("codebook", |scene| colors(scene).codebooks.clear()),
-    ("codebook", |scene| shorten(&mut colors(scene).scales)),
-    ("finite", |scene| colors(scene).scales[3][1] = f32::NAN),
+    ("codebook", |scene| codebooks(scene).entries[1] -= 1),
+    ("codebook", |scene| codebooks(scene).entries[0] = u32::MAX),
+    ("codebook", |scene| codebooks(scene).entries = vec![1; 5]),
+    ("codebook", |scene| shorten(&mut codebooks(scene).words)),
+    ("codebook", |scene| codebooks(scene).words.clear()),
+    ("codebook", |scene| shorten(&mut codebooks(scene).scales)),
+    ("finite", |scene| codebooks(scene).scales[3][1] = f32::NAN),
     ("colors", |scene| shorten(&mut colors(scene).records)),
     ("codebook", |scene| colors(scene).degree = 3),
     ("degree", |scene| colors(scene).degree = 4),

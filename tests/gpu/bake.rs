@@ -6,7 +6,7 @@
 use crate::support::capture::Capture;
 use crate::support::gpu;
 use bevy_gs4d::offline::bake::{BakeSettings, Baked, bake};
-use bevy_gs4d::offline::compress::Quality;
+use bevy_gs4d::offline::compress::{PackedOrder, Quality};
 use bevy_gs4d::offline::dataset::SplitOptions;
 use bevy_gs4d::offline::engine::Engine;
 use bevy_gs4d::offline::filter::KeyFrames;
@@ -48,7 +48,7 @@ impl Capture {
             key_frames: KeyFrames::default(),
             fine_tune: Some(FineTuneSettings { steps: 6, evaluate_every: 2, ..FineTuneSettings::default() }),
             quality: Quality::Lossless,
-            progressive: false,
+            order: PackedOrder::Spatial,
             level: None,
             trust_images: false,
             keep_work: false,

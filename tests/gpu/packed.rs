@@ -1,6 +1,7 @@
 //! The packed form on the GPU.
 //!
-//! In: packed synthetic scenes. Out: proof that the GPU decodes them like the CPU reference. Skipped where there is no
+//! In: packed synthetic scenes. Out: proof that the GPU decodes them like the CPU reference, and that scenes with the same
+//! codebooks share their buffer. Skipped where there is no
 //! GPU.
 
 use crate::support::gpu;
@@ -9,6 +10,7 @@ use bevy_gs4d::offline::compress::compress;
 use bevy_gs4d::reference;
 use bevy_gs4d::renderer::GpuError;
 use bevy_gs4d::scene::{CodedColors, Form, PackedColors, PackedScene};
+use std::sync::Arc;
 
 #[test]
 fn packed_scenes_match_the_cpu_reference() {
@@ -34,6 +36,26 @@ fn packed_scenes_match_the_cpu_reference() {
     }
 }
 
+#[test]
+fn captures_with_the_same_codebooks_share_their_buffer() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let (packed, _) = compress(scene(2_000, 3, 0), &settings(&[64, 32])).expect("compression succeeds");
+    let first = packed.into_runtime().expect("drawable");
+    let (second, mut other) = (first.clone(), first.clone());
+    let Form::Packed(scene) = &mut other.form else { panic!("the scene is packed") };
+    coded(scene, |colors| colors.codebooks = Arc::new((*colors.codebooks).clone()));
+    let scenes = [first, second, other];
+    let captures = scenes.each_ref().map(|scene| headless.upload(scene).expect("the scene fits the GPU"));
+    // 16 coefficients of three colors in half precision.
+    let codebooks = (64 + 32) * 16 * 3 * 2;
+    assert_eq!(captures[0].bytes() - captures[1].bytes(), codebooks, "the second capture has no codebooks of its own");
+    assert_eq!(captures[0].bytes(), captures[2].bytes(), "equal codebooks that are another allocation are not shared");
+    let pictures = captures
+        .each_ref()
+        .map(|capture| headless.render(capture, &view(0.3), BLACK).expect("the view is drawn").picture);
+    assert!(pictures[1] == pictures[0] && pictures[2] == pictures[0], "one picture");
+}
+
 /// Damages the codebook colors of a scene.
 fn coded(packed: &mut PackedScene, spoil: impl FnOnce(&mut CodedColors)) {
     let PackedColors::Coded(colors) = &mut packed.colors else { panic!("the colors are coded") };
@@ -50,7 +72,7 @@ fn inconsistent_packed_scenes_are_not_uploaded() {
         |packed| packed.ranges.truncate(4),
         |packed| packed.records.truncate(256),
         |packed| coded(packed, |colors| colors.records[599][1] |= 0xffff),
-        |packed| coded(packed, |colors| colors.codebooks.truncate(7)),
+        |packed| coded(packed, |colors| Arc::make_mut(&mut colors.codebooks).words.truncate(7)),
     ];
     for (index, spoil) in spoils.into_iter().enumerate() {
         let mut bad = good.clone();

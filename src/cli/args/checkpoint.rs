@@ -10,9 +10,10 @@ use crate::codec::import::Imported;
 use crate::codec::{self, CodecError, InvalidOption, ReadOptions};
 use crate::gaussian::{Model, ShDirection};
 use crate::offline::train::CaptureSettings;
-use crate::scene::{GaussianScene, RotationConvention, SceneForm, TrainedCameras, UpAxis};
+use crate::scene::{ColorCodebooks, GaussianScene, RotationConvention, SceneForm, TrainedCameras, UpAxis};
 use crate::view::RasterFov;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Settings that a checkpoint does not contain.
 #[derive(clap::Args, Default)]
@@ -66,6 +67,9 @@ pub(crate) struct CheckpointArgs {
     /// of the Gaussian's three scales [default: 0.25].
     #[arg(long, value_name = "SCALES", value_parser = values::number)]
     tolerance: Option<f32>,
+    /// The codebooks of a chunk file, if those of its capture have been read ([`ReadOptions::codebooks`]).
+    #[arg(skip)]
+    pub codebooks: Option<Arc<ColorCodebooks>>,
 }
 
 const ROTATION_CONVENTIONS: [(&str, RotationConvention); 2] =
@@ -192,6 +196,7 @@ impl CheckpointArgs {
             fps: self.fps,
             tolerance: self.tolerance,
             sequence: false,
+            codebooks: self.codebooks.clone(),
         }
     }
 }

@@ -85,6 +85,10 @@ pub(crate) enum Need {
     Quantized,
     /// A quality that changes the order of the Gaussians.
     Layers,
+    /// A result that is compressed.
+    Compressed,
+    /// A capture that has not been cut into chunks when it was compressed.
+    Uncut,
     /// Colors that are not coded.
     WholeColors,
     /// Colors that are coded.
@@ -356,8 +360,14 @@ pub(crate) const RULES: &[Rule] = &[
     },
     Rule {
         need: Need::Layers,
-        options: &["--progressive"],
+        options: &["--progressive", "--chunk"],
         reason: "with the quality lossless, which keeps the order of the Gaussians",
+    },
+    Rule { need: Need::Compressed, options: &["--progressive", "--chunk"], reason: "without --compress" },
+    Rule {
+        need: Need::Uncut,
+        options: &["--chunk", "--layers"],
+        reason: "on a packed capture, which is cut as gs4d compress --chunk has ordered it",
     },
     Rule { need: Need::WholeColors, options: &["--color-step"], reason: "on colors that are coded by codebooks" },
     Rule {

@@ -6,7 +6,7 @@
 //! `NAME.trained.gs4d`; or the stages as jobs for many machines, or one of these jobs.
 
 use crate::cli::args::{
-    CheckpointArgs, EngineArgs, Given, Need, PackageArgs, ScoringArgs, ValidationArgs, score_choice, values,
+    CheckpointArgs, EngineArgs, Given, Need, OrderArgs, PackageArgs, ScoringArgs, ValidationArgs, score_choice, values,
 };
 use crate::cli::output::failure::Failure;
 use crate::cli::output::interrupt;
@@ -130,9 +130,8 @@ pub(crate) struct Bake {
     /// How much may be lost: small, balanced, visually-lossless or lossless.
     #[arg(long, value_name = "QUALITY", default_value = "balanced", value_parser = values::one_of(&Quality::NAMES))]
     quality: Quality,
-    /// Store the most important Gaussians first, so that a player shows a coarse picture before the whole file is there.
-    #[arg(long)]
-    progressive: bool,
+    #[command(flatten)]
+    order: OrderArgs,
     /// Do not train the Gaussians that remain after pruning. By default they are trained if there is a GPU and the
     /// images of all training views exist.
     #[arg(long)]
@@ -416,7 +415,7 @@ impl Bake {
             fine_tune: (!self.no_fine_tune)
                 .then(|| FineTuneSettings { batch: self.batch, ..FineTuneSettings::default() }),
             quality: self.quality,
-            progressive: self.progressive,
+            order: self.order.order(),
             level: self.package.level,
             trust_images: self.validation.trust_images,
             keep_work: self.keep_work,

@@ -3,14 +3,16 @@
 //! In: a scene, a quality or single options. Out: a package in the packed form, bytes by section, PSNR of its pictures
 //! to those of the original scene, and warnings if it does not keep what the quality promises.
 
-use crate::cli::args::{CheckpointArgs, EngineArgs, Given, Need, PackageArgs, ViewArgs, file_size, values};
+use crate::cli::args::{CheckpointArgs, EngineArgs, Given, Need, OrderArgs, PackageArgs, ViewArgs, file_size, values};
 use crate::cli::output::failure::Failure;
 use crate::cli::output::note::note;
 use crate::cli::output::progress::Bars;
 use crate::cli::output::report::Report;
 use crate::cli::output::table::{Table, bytes};
 use crate::codec::package;
-use crate::offline::compress::{CompressSettings, Quality, broken_promises, compress_with, require_unpacked};
+use crate::offline::compress::{
+    CompressSettings, PackedOrder, Quality, broken_promises, compress_with, require_unpacked,
+};
 use crate::offline::forms::convert::merge;
 use crate::offline::measure::SquaredError;
 use crate::offline::measure::reference_pictures::ReferencePictures;
@@ -34,6 +36,7 @@ Examples:
   gs4d compress chkpnt30000.pth small.gs4d --quality small --cameras transforms_test.json
   gs4d compress chkpnt30000.pth exact.gs4d --quality visually-lossless
   gs4d compress chkpnt30000.pth page.gs4d --progressive
+  gs4d compress long.gs4d packed.gs4d --chunk 1, then gs4d split packed.gs4d -o chunks
   gs4d compress chkpnt30000.pth own.gs4d --codebooks 4096,4096 --scale-bits 10 --escape 0.05
 
 No choice is made on pictures, and no training views are needed: --cameras takes those of a dataset for the comparison with the original.
@@ -50,6 +53,8 @@ pub(crate) struct Compress {
     /// How much may be lost: small, balanced, visually-lossless or lossless.
     #[arg(long, value_name = "QUALITY", default_value = "balanced", value_parser = values::one_of(&Quality::NAMES))]
     quality: Quality,
+    #[command(flatten)]
+    order: OrderArgs,
     #[command(flatten)]
     knobs: Knobs,
     /// First merge Gaussians of consecutive frames of a sequence that differ by at most this part of their scales,
@@ -105,9 +110,6 @@ struct Knobs {
     /// Without codebooks: round every coefficient to a multiple of this; 0 keeps them as they are.
     #[arg(long, value_name = "STEP", value_parser = values::step)]
     color_step: Option<f32>,
-    /// Store the most important Gaussians first, so that a player shows a coarse picture before the whole file is there.
-    #[arg(long)]
-    progressive: bool,
     /// Share of the Gaussians, those with the largest splats, that keep 16 bits for mean, scale and rotation.
     #[arg(long, value_name = "SHARE", value_parser = values::share)]
     escape: Option<f64>,
@@ -131,7 +133,7 @@ impl Knobs {
             geometry,
             codebooks: self.codebooks.clone().unwrap_or(settings.codebooks),
             color_step: self.color_step.unwrap_or(settings.color_step),
-            progressive: self.progressive,
+            order: PackedOrder::Spatial,
             weights: None,
         }
     }
@@ -156,7 +158,7 @@ impl Compress {
         let scene = scene.into_runtime().map_err(|error| Failure::at(&self.input, &error))?;
         let weights = self.weights.as_ref().map(|path| read_weights(path, scene.len())).transpose()?;
         let originals = self.originals(&scene, progress)?;
-        let settings = CompressSettings { weights, ..self.knobs.settings(self.quality) };
+        let settings = CompressSettings { weights, order: self.order.order(), ..self.knobs.settings(self.quality) };
         progress.begin("codebooks", settings.codebooks.len());
         let compressed = compress_with(scene, &settings, || progress.advance());
         progress.finish();
@@ -191,7 +193,10 @@ impl Compress {
             bytes(report.memory_after as u64),
         );
         if report.fillers > 0 {
-            let reason = "they fill blocks, since some Gaussians are far from the others";
+            let reason = match settings.order {
+                PackedOrder::Chunks(_) => "they fill the blocks of chunks",
+                _ => "they fill blocks, since some Gaussians are far from the others",
+            };
             text += &format!("{} invisible Gaussians were added: {reason}\n", report.fillers);
         }
         let psnr: Vec<f64> = errors.iter().map(SquaredError::psnr).collect();
@@ -225,7 +230,7 @@ impl Compress {
     /// Prints and returns the promises of the quality that the compressed scene does not keep; none if single options
     /// replace settings of the quality. `psnr` is that of all pictures to those of the original, dB.
     fn warnings(&self, scene: &RuntimeScene, psnr: Option<f64>) -> Vec<String> {
-        let settings = CompressSettings { progressive: false, ..self.knobs.settings(self.quality) };
+        let settings = self.knobs.settings(self.quality);
         let is_of_quality = settings == CompressSettings::from(self.quality);
         let warnings = match &scene.form {
             Form::Packed(packed) if is_of_quality => broken_promises(self.quality, packed, psnr),

@@ -4,7 +4,7 @@
 //! packed form with `--compress`, and its quality before, during and after training.
 
 use crate::cli::args::{
-    CheckpointArgs, Given, Need, PackageArgs, RendererArgs, SplitArgs, TrainingArgs, ValidationArgs, values,
+    CheckpointArgs, Given, Need, OrderArgs, PackageArgs, RendererArgs, SplitArgs, TrainingArgs, ValidationArgs, values,
 };
 use crate::cli::output::curve::curve_table;
 use crate::cli::output::exposures::exposure_row;
@@ -93,12 +93,11 @@ pub(crate) struct FineTune {
     /// sizes follow the number of Gaussians. visually-lossless and lossless have no codebooks.
     #[arg(long, value_name = "QUALITY", value_parser = values::one_of(&Quality::NAMES))]
     compress: Option<Quality>,
-    /// With --compress: store the most important Gaussians first, as `gs4d compress --progressive` does.
-    #[arg(long, requires = "compress")]
-    progressive: bool,
+    #[command(flatten)]
+    order: OrderArgs,
     /// Train codebooks on pictures of the rounded geometry of the package. Useful only if geometry has fewer bits than
     /// with `small`.
-    #[arg(long, help_heading = "Experimental", requires = "compress", conflicts_with = "progressive")]
+    #[arg(long, help_heading = "Experimental", requires = "compress", conflicts_with_all = ["progressive", "chunk"])]
     round_geometry: bool,
     /// Steps that train codebooks, after the other steps.
     #[arg(long, value_name = "N", default_value = "2000", requires = "compress", value_parser = values::count(1_000_000))]
@@ -225,6 +224,7 @@ impl FineTune {
     fn check_options(&self) -> Result<(), Failure> {
         self.given.require(Need::ValidationViews, self.validation.validation != Validation::None)?;
         let is_coded = |quality: Quality| !CompressSettings::from(quality).codebooks.is_empty();
+        self.given.require(Need::Compressed, self.compress.is_some())?;
         self.given.require(Need::Layers, self.compress != Some(Quality::Lossless))?;
         self.given.require(Need::TrainedCodebooks, self.compress.is_none_or(is_coded))
     }
@@ -249,7 +249,7 @@ impl FineTune {
             refresh_filter: self.refresh_filter,
             mode: self.gradients,
             rounding: self.round_geometry,
-            progressive: self.progressive,
+            order: self.order.order(),
             compress: self.compress.map(|quality| (quality, self.compress_steps)),
             ..shared
         }

@@ -16,7 +16,7 @@ use crate::offline::dataset::{CameraOptions, Dataset};
 use crate::offline::forms::convert::form_name;
 use crate::scene::packed::MAX_STAGES;
 use crate::scene::{
-    Bounds, ChunkTable, ColorDegrees, GaussianScene, Level, PlaybackHints, SceneForm, Socket, TrainedWith,
+    Bounds, ChunkTable, ColorDegrees, Form, GaussianScene, Level, PlaybackHints, Runs, SceneForm, Socket, TrainedWith,
 };
 use glam::Vec3;
 use serde::Serialize;
@@ -69,6 +69,8 @@ struct Facts {
     colliders: Option<ColliderFacts>,
     /// Of the index of a capture in chunk files.
     chunks: Option<ChunkFacts>,
+    /// Of packed Gaussians in the order of chunk files.
+    runs: Option<RunFacts>,
 }
 
 /// A level of detail, without its Gaussians.
@@ -109,6 +111,15 @@ struct ChunkFacts {
     gaussians: u64,
     /// The length of all files.
     bytes: u64,
+}
+
+/// The order of chunk files.
+#[derive(Serialize)]
+struct RunFacts {
+    files: usize,
+    /// Number of stretches of time.
+    stretches: u32,
+    layers: usize,
 }
 
 /// Bounds of the Gaussians, capture units.
@@ -200,6 +211,7 @@ impl Info {
             "sockets": facts.sockets,
             "colliders": facts.colliders,
             "chunks": facts.chunks,
+            "runs": facts.runs,
             "megabits_per_second": rate,
             "bounds": extent.as_ref().map(|extent| box_json(&extent.all)),
             "core": extent.as_ref().map(|extent| box_json(&extent.core)),
@@ -212,17 +224,13 @@ impl Info {
 
 impl Facts {
     fn of_scene(scene: &GaussianScene) -> Self {
-        let coded = match &scene.form {
-            SceneForm::Trained(_) => None,
-            SceneForm::Ready(form) => form.coded_colors(),
-        };
         Self {
             gaussians: scene.len(),
             form: form_name(&scene.form),
             // Without Gaussians a scene does not have the model of its chunk files.
             model: scene.model().filter(|_| scene.chunks.is_none()),
             color: scene.form.color_degrees(),
-            codebooks: coded.map(|colors| colors.entries.clone()),
+            codebooks: scene.form.codebooks().map(|codebooks| codebooks.entries.clone()),
             environment: scene.environment.as_ref().map(|map| [map.width, map.height]),
             trained_with: scene.trained_with.clone(),
             playback: scene.playback,
@@ -233,6 +241,10 @@ impl Facts {
                 ColliderFacts::of_meshes(colliders.stretches.len(), meshes)
             }),
             chunks: scene.chunks.as_deref().map(ChunkFacts::of),
+            runs: match &scene.form {
+                SceneForm::Ready(Form::Packed(packed)) => packed.runs.as_ref().map(RunFacts::of),
+                SceneForm::Trained(_) | SceneForm::Ready(Form::Sliced(_)) => None,
+            },
         }
     }
 
@@ -265,6 +277,7 @@ impl Facts {
                 ColliderFacts::of_meshes(colliders.stretches.len(), meshes)
             }),
             chunks: header.chunks.as_ref().map(ChunkFacts::of),
+            runs: header.runs.as_ref().map(RunFacts::of),
         }
     }
 
@@ -304,6 +317,10 @@ impl Facts {
             let of = format!("{gaussians} Gaussians in {layers} layers over {stretches} stretches of time, {length}");
             pairs.push(("chunks", format!("the index of {files} chunk files: {of}")));
         }
+        if let Some(RunFacts { files, stretches, layers }) = &self.runs {
+            let of = format!("{files} chunk files in {layers} layers over {stretches} stretches of time");
+            pairs.push(("order", format!("that of {of}, into which gs4d split cuts it")));
+        }
         pairs
     }
 }
@@ -341,6 +358,12 @@ impl ChunkFacts {
             gaussians: table.files.iter().map(|file| file.gaussians).sum(),
             bytes: table.files.iter().map(|file| file.bytes).sum(),
         }
+    }
+}
+
+impl RunFacts {
+    fn of(runs: &Runs) -> Self {
+        Self { files: runs.parts.len(), stretches: runs.stretches, layers: runs.layers().len() + 1 }
     }
 }
 

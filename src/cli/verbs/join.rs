@@ -29,8 +29,8 @@ Examples:
   gs4d join chunks -o long.gs4d
 
 Segments must be in one space, and have the same settings (background, up axis, degree of color, ...): gs4d convert changes those of a file.
-Packed captures would be rounded twice: join lossless ones (gs4d bake --quality lossless), then use gs4d compress, which trains codebooks for
-all segments. Segments of different speeds are stretched to that of the first and need colors at rest (gs4d convert --sh-degree-t 0). Chunks
+Packed segments would be rounded twice: join lossless ones (gs4d bake --quality lossless), then use gs4d compress, which trains codebooks for
+all segments. Packed chunks are put together as they were. Segments of different speeds are stretched to that of the first and need colors at rest (gs4d convert --sh-degree-t 0). Chunks
 are known by their names, chunk-00001-of-00012.gs4d: name their folder, or all of them.")]
 pub(crate) struct Join {
     /// The segments in their order: checkpoints or packages that are not packed, or folders of chunks.
@@ -100,10 +100,11 @@ impl Join {
         progress.begin("reading", sources.iter().map(|source| source.files.len()).sum());
         let mut segments = Vec::with_capacity(sources.len());
         for Source { path, files, is_split } in sources {
-            let mut parts = Vec::with_capacity(files.len());
+            let (mut parts, mut args) = (Vec::with_capacity(files.len()), CheckpointArgs::default());
             for file in files {
                 proceed(progress)?;
-                let scene = CheckpointArgs::default().load_to_change(file)?;
+                let scene = args.load_to_change(file)?;
+                args.codebooks = scene.form.codebooks().filter(|_| *is_split).cloned();
                 parts.push(Segment { path: file.clone(), scene });
                 progress.advance();
             }

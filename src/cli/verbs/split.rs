@@ -1,18 +1,19 @@
 //! `gs4d split IN -o FOLDER`: cuts a capture into chunk files.
 //!
-//! In: a capture, the length of a stretch of time, the shares of its layers. Out: a folder with a package for each layer
+//! In: a capture, the length of a stretch of time, the shares of its layers; or a packed capture, which has been cut when
+//! it was compressed. Out: a folder with a package for each layer
 //! of each run of Gaussians that are alive in the same stretches, and an index of them; a report of the times and the
 //! size of each, and of the bit rates of layers.
 
 use super::info::bit_rate;
-use crate::cli::args::{CheckpointArgs, file_size, values};
+use crate::cli::args::{CheckpointArgs, Given, Need, file_size, values};
 use crate::cli::output::failure::Failure;
 use crate::cli::output::progress::Bars;
 use crate::cli::output::report::Report;
 use crate::cli::output::table::{Table, bytes, lines};
-use crate::offline::segments::{Chunk, Chunks, LayerShares, Segment, Split, other_chunk};
+use crate::offline::segments::{Chunk, Chunks, Cut, LayerShares, Segment, Split, other_chunk};
 use crate::offline::store::outputs::Files;
-use crate::scene::ChunkTable;
+use crate::scene::{ChunkTable, Form, SceneForm};
 use serde_json::{Value, json};
 use std::fs;
 use std::path::PathBuf;
@@ -24,18 +25,25 @@ use std::path::PathBuf;
 /// stretches are in layers, the most important first. Each file is a package with the clock of the whole capture. An
 /// index, index.gs4d, lists the files: a player loads the index, and then the files that it needs at a time. gs4d join
 /// puts the files together again.
+///
+/// A packed capture is cut as gs4d compress --chunk has ordered its Gaussians: no value changes, the files together are
+/// as small as the package, and the index has the codebooks of their colors.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
   gs4d split long.gs4d -o chunks
   gs4d split long.gs4d -o chunks --chunk 0.5 --layers 20,30,50 --json
+  gs4d compress long.gs4d packed.gs4d --chunk 1 --layers 5,20,25,50
+  gs4d split packed.gs4d -o chunks
   gs4d join chunks -o long.gs4d
 
 The pictures of the joined chunks are those of IN. Its Gaussians are in the order of the chunks; split and joined once more, the files are the
-same byte for byte. Runs of fewer than 256 Gaussians become part of longer ones, and such layers of others. Packed captures would be rounded
-twice: split lossless ones.")]
+same byte for byte. Runs of fewer than 256 Gaussians become part of longer ones, and such layers of others; in packed captures, of fewer than
+2048.")]
 pub(crate) struct SplitVerb {
-    /// The checkpoint or package to read, not packed.
+    #[command(flatten)]
+    given: Given,
+    /// The checkpoint or package to read.
     #[arg(value_name = "IN")]
     input: PathBuf,
     /// The folder to write to, which is created if it does not exist.
@@ -47,7 +55,7 @@ pub(crate) struct SplitVerb {
     /// Shares of the Gaussians in layers, percent, the most important first; 100: one layer.
     #[arg(long, value_name = "PERCENT,..", default_value = "25,25,50", value_parser = values::layers)]
     layers: LayerShares,
-    /// zstd level, 1 (fast) to 19 (small) [default: 9].
+    /// zstd level, 1 (fast) to 19 (small) [default: 9; of packed captures 19].
     #[arg(long, value_name = "LEVEL", value_parser = clap::value_parser!(i32).range(1..=19))]
     level: Option<i32>,
 }
@@ -56,7 +64,7 @@ impl SplitVerb {
     /// Cuts the capture and writes the chunk files and their index.
     ///
     /// # Errors
-    /// A capture that cannot be read or is packed, chunks of another capture in the folder, files that cannot be written.
+    /// A capture that cannot be read, or is packed and was not cut when it was compressed; chunks of another capture in the folder, files that cannot be written.
     pub(crate) fn run(&self) -> Result<Report, Failure> {
         let files = Files::default().reads_scene(&self.input);
         let index = self.out.join(ChunkTable::INDEX);
@@ -64,8 +72,16 @@ impl SplitVerb {
         files.clone().writes_folder(&self.out, [index.clone()]).check()?;
         let scene = CheckpointArgs::default().load_to_change(&self.input)?;
         let segment = Segment { path: self.input.clone(), scene };
-        let stretches = self.stretches(segment.scene.playback.duration_seconds)?;
-        let split = Split::of(&segment, stretches, &self.layers)?;
+        let split = match &segment.scene.form {
+            SceneForm::Ready(Form::Packed(_)) => {
+                self.given.require(Need::Uncut, false)?;
+                Split::of_runs(&segment)?
+            }
+            SceneForm::Trained(_) | SceneForm::Ready(Form::Sliced(_)) => {
+                let stretches = self.stretches(segment.scene.playback.duration_seconds)?;
+                Split::of(&segment, stretches, &self.layers)?
+            }
+        };
         let paths = split.paths(&self.out);
         if let Some(other) = other_chunk(&self.out, &paths) {
             let reason = "is a chunk of another split, which would be read with this one: remove it, or write to another \
@@ -80,13 +96,11 @@ impl SplitVerb {
 
     /// Returns the number of stretches of time of a capture that plays for `seconds`.
     fn stretches(&self, seconds: f32) -> Result<u32, Failure> {
-        let count = (f64::from(seconds) / f64::from(self.chunk)).ceil().max(1.0);
-        let most = ChunkTable::MOST_STRETCHES;
-        if count > f64::from(most) {
-            let many = format!("{count} stretches of time are more than {most}");
-            return Err(Failure::about(&self.input, &format!("--chunk {}: {many}: give a longer one", self.chunk)));
-        }
-        Ok(count as u32)
+        let stretches = Cut { seconds: self.chunk, layers: self.layers.clone() }.stretches(seconds);
+        stretches.ok_or_else(|| {
+            let many = format!("makes more than {} stretches of time: give a longer one", ChunkTable::MOST_STRETCHES);
+            Failure::about(&self.input, &format!("--chunk {} {many}", self.chunk))
+        })
     }
 
     fn report(&self, segment: &Segment, chunks: &Chunks) -> Result<Report, Failure> {

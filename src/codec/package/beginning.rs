@@ -7,7 +7,7 @@
 use super::attribute::Attribute;
 use super::envelope;
 use super::error::PackageError;
-use super::header::{Header, StoredForm};
+use super::header::{CODEBOOKS_IN_INDEX, Header, StoredForm};
 use super::section::Section;
 use crate::scene::FilterKind;
 use std::io;
@@ -115,12 +115,19 @@ fn plain(header: &Header, count: usize) -> Header {
         environment: None,
         filter: None,
         layers,
+        runs: None,
+        codebooks_in_index: false,
         levels: Vec::new(),
         sockets: Vec::new(),
         colliders: None,
         chunks: None,
         sections: Vec::new(),
-        requires: header.requires.iter().filter(|name| *name != "filter").cloned().collect(),
+        requires: header
+            .requires
+            .iter()
+            .filter(|name| !["filter", CODEBOOKS_IN_INDEX].contains(&name.as_str()))
+            .cloned()
+            .collect(),
         ..header.clone()
     }
 }

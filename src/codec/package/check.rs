@@ -139,11 +139,26 @@ impl Header {
             self.layers.is_empty() || (is_packed && are_layers(&self.layers, self.gaussians)),
             "layers that are not ascending numbers of whole blocks of packed Gaussians, or too many",
         )?;
+        if let Some(runs) = &self.runs {
+            runs.check(self.gaussians).map_err(PackageError::Inconsistent)?;
+            sane(
+                is_packed && runs.layers() == self.layers,
+                "runs of Gaussians that are not packed, or of other layers",
+            )?;
+        }
+        sane(
+            !self.codebooks_in_index || self.form.has_codebooks(),
+            "a chunk file that has no codebooks and says that they are in its index",
+        )?;
         sane(self.levels.len() <= MAX_LEVELS, "more levels of detail than a capture may have")?;
         check_sizes(self.levels.iter().map(|level| level.pixels)).map_err(PackageError::Inconsistent)?;
         check_sockets(&self.sockets).map_err(PackageError::Inconsistent)?;
         self.colliders.as_ref().map_or(Ok(()), StoredColliders::check).map_err(PackageError::Inconsistent)?;
         self.chunks.as_ref().map_or(Ok(()), ChunkTable::check).map_err(PackageError::Inconsistent)?;
+        sane(
+            self.chunks.is_none() || (self.gaussians == 0 && self.levels.is_empty()),
+            "the index of a capture in chunk files with Gaussians or levels of detail itself",
+        )?;
         let duration = self.playback.duration_seconds;
         sane(duration.is_finite() && duration >= 0.0, "the playback duration must be a finite number, zero or above")
     }

@@ -4,6 +4,7 @@
 
 use crate::codec::options::InvalidOption;
 use crate::codec::text::printable;
+use crate::scene::ChunkTable;
 
 /// Why a package cannot be read or written. [`CodecError`](crate::codec::CodecError) adds the path.
 #[derive(Debug, thiserror::Error)]
@@ -53,6 +54,12 @@ pub enum PackageError {
     UnknownFeature {
         /// Name in the header's list of requirements.
         name: String,
+    },
+    /// A chunk file without the codebooks of its index, or with those of another.
+    #[error("a chunk file whose codebooks are in the index of its capture, {index}, {fault}", index = ChunkTable::INDEX)]
+    CodebooksOfIndex {
+        /// What is wrong with the index.
+        fault: String,
     },
     /// Numbers of the header, or parts of a scene to be written, that contradict each other or are invalid.
     #[error("{0}")]

@@ -11,7 +11,7 @@ use crate::gaussian::{Gaussian, MARGINAL_CUTOFF, Model};
 use crate::scene::packed::{COLOR_WORDS, MAX_STAGES, RECORD_WORDS};
 use crate::scene::{
     ActiveSets, ChunkTable, ColorDegrees, FilterKind, Form, GaussianScene, PackedColors, PackedScene, PlaybackHints,
-    SceneForm, Socket, TemporalFilter, Trained, TrainedWith,
+    Runs, SceneForm, Socket, TemporalFilter, Trained, TrainedWith,
 };
 use crate::view::NEAR;
 use serde::{Deserialize, Serialize};
@@ -48,6 +48,12 @@ pub struct Header {
     /// Numbers of Gaussians up to the ends of the layers but the last ([`PackedScene::layers`]). Empty: one layer.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub layers: Vec<usize>,
+    /// Which Gaussians are in which chunk file ([`PackedScene::runs`]).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub runs: Option<Runs>,
+    /// Whether the package is a chunk file whose codebooks are in the index beside it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub codebooks_in_index: bool,
     /// The levels of detail, finest first. Each is a section `level` of its own.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub levels: Vec<StoredLevel>,
@@ -104,6 +110,11 @@ impl StoredForm {
         }
     }
 
+    /// Returns whether there is a codebook.
+    pub(super) fn has_codebooks(self) -> bool {
+        matches!(self, Self::Packed { codebooks: Some(entries) } if entries.iter().any(|&entries| entries > 0))
+    }
+
     /// Returns the form of a scene.
     pub fn of(form: &SceneForm) -> Self {
         match form {
@@ -113,7 +124,7 @@ impl StoredForm {
                 codebooks: match &packed.colors {
                     PackedColors::Whole(_) => None,
                     PackedColors::Coded(colors) => {
-                        let entries = |stage| colors.entries.get(stage).copied().unwrap_or_default();
+                        let entries = |stage| colors.codebooks.entries.get(stage).copied().unwrap_or_default();
                         Some(std::array::from_fn(entries))
                     }
                 },
@@ -134,7 +145,10 @@ pub struct StoredFilter {
 }
 
 /// Names of the features that packages of this version may require.
-const FEATURES: [&str; 6] = ["packed", "filter", "cutoff", "near", "mip_filter", "color_period"];
+const FEATURES: [&str; 7] = ["packed", "filter", "cutoff", "near", "mip_filter", "color_period", CODEBOOKS_IN_INDEX];
+
+/// The feature of chunk files whose codebooks are in the index beside them.
+pub(super) const CODEBOOKS_IN_INDEX: &str = "codebooks_in_index";
 
 /// Size of an environment map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -153,15 +167,24 @@ struct Requirements {
 }
 
 impl Header {
-    /// Returns the header of a scene, without sections.
-    pub(super) fn of(scene: &GaussianScene) -> Self {
+    /// Returns the header of a scene, without sections. `codebooks_in_index`: whether its codebooks are left to an index.
+    pub(super) fn of(scene: &GaussianScene, codebooks_in_index: bool) -> Self {
         let form = StoredForm::of(&scene.form);
         let ColorDegrees { coefficients, degree, degree_t } = scene.form.color_degrees();
         let TrainedWith { marginal_cutoff, near, mip_filter, color_period, .. } = scene.trained_with;
         let is_packed = matches!(form, StoredForm::Packed { .. });
         let is_cut_elsewhere = marginal_cutoff != MARGINAL_CUTOFF;
         let repeats = color_period.is_some();
-        let used = [is_packed, scene.filter.is_some(), is_cut_elsewhere, near != NEAR, mip_filter, repeats];
+        let codebooks_in_index = codebooks_in_index && form.has_codebooks();
+        let used = [
+            is_packed,
+            scene.filter.is_some(),
+            is_cut_elsewhere,
+            near != NEAR,
+            mip_filter,
+            repeats,
+            codebooks_in_index,
+        ];
         let requires = FEATURES.iter().zip(used).filter(|(_, used)| *used).map(|(name, _)| (*name).to_owned());
         Self {
             generator: concat!("bevy_gs4d ", env!("CARGO_PKG_VERSION")).to_owned(),
@@ -183,6 +206,11 @@ impl Header {
                 SceneForm::Ready(Form::Packed(packed)) => packed.layers.clone(),
                 SceneForm::Trained(_) | SceneForm::Ready(Form::Sliced(_)) => Vec::new(),
             },
+            runs: match &scene.form {
+                SceneForm::Ready(Form::Packed(packed)) => packed.runs.clone(),
+                SceneForm::Trained(_) | SceneForm::Ready(Form::Sliced(_)) => None,
+            },
+            codebooks_in_index,
             levels: scene.levels.iter().map(|level| StoredLevel { pixels: level.pixels }).collect(),
             sockets: scene.sockets.clone(),
             colliders: scene.colliders.as_deref().map(StoredColliders::of),
@@ -265,6 +293,8 @@ impl Header {
             attributes.push(record("color_base", 0, 1));
             if stages > 0 {
                 attributes.push(record("color_codes", 1, stages.div_ceil(2)));
+            }
+            if stages > 0 && !self.codebooks_in_index {
                 attributes.push(Attribute { name: "codebooks", rows: total, stride: words, offset: 0, width: words });
                 let scales = stages * words;
                 attributes.push(Attribute { name: "codebook_scales", rows: scales, stride: 4, offset: 0, width: 4 });

@@ -7,8 +7,8 @@ use super::colliders::{ColliderWords, StoredColliders};
 use super::header::{Header, StoredForm};
 use crate::gaussian::{Harmonics, Model, Parameters};
 use crate::scene::{
-    ActiveSets, CodedColors, Environment, Form, GaussianScene, PackedColors, PackedScene, SceneForm, Sliced,
-    TemporalFilter, Trained,
+    ActiveSets, CodedColors, ColorCodebooks, Environment, Form, GaussianScene, PackedColors, PackedScene, SceneForm,
+    Sliced, TemporalFilter, Trained,
 };
 use bytemuck::{Zeroable, cast_slice, cast_slice_mut};
 use std::sync::Arc;
@@ -29,13 +29,17 @@ pub(super) fn empty(header: &Header) -> GaussianScene {
             records: Vec::new(),
             ranges: Vec::new(),
             layers: header.layers.clone(),
+            runs: header.runs.clone(),
             colors: match codebooks {
                 None => PackedColors::Whole(harmonics),
                 Some(entries) => PackedColors::Coded(CodedColors {
                     degree: header.degree,
                     degree_t: header.degree_t,
-                    entries: entries.into_iter().filter(|&entries| entries > 0).collect(),
-                    ..CodedColors::default()
+                    records: Vec::new(),
+                    codebooks: Arc::new(ColorCodebooks {
+                        entries: entries.into_iter().filter(|&entries| entries > 0).collect(),
+                        ..ColorCodebooks::default()
+                    }),
                 }),
             },
         })),
@@ -92,10 +96,13 @@ pub(super) fn grow(scene: &mut GaussianScene, colliders: &mut ColliderWords, hea
                 PackedColors::Whole(harmonics) => zeros.fill(&mut harmonics.values, colors),
                 PackedColors::Coded(coded) => {
                     let words = coded.words_per_entry();
-                    let entries: usize = coded.entries.iter().map(|&entries| entries as usize).sum();
                     zeros.fill(&mut coded.records, count);
-                    zeros.fill(&mut coded.codebooks, entries * words);
-                    zeros.fill(&mut coded.scales, coded.entries.len() * words);
+                    if !header.codebooks_in_index {
+                        let codebooks = Arc::make_mut(&mut coded.codebooks);
+                        let (entries, stages) = (codebooks.total(), codebooks.entries.len());
+                        zeros.fill(&mut codebooks.words, entries * words);
+                        zeros.fill(&mut codebooks.scales, stages * words);
+                    }
                 }
             }
         }
@@ -176,8 +183,8 @@ fn words_of_packed<'a>(packed: &'a PackedScene, name: &str) -> &'a [u32] {
         ("packed_mean" | "packed_motion" | "packed_shape", _) => cast_slice(&packed.records),
         ("packed_ranges", _) => cast_slice(&packed.ranges),
         ("color_base" | "color_codes", PackedColors::Coded(colors)) => cast_slice(&colors.records),
-        ("codebooks", PackedColors::Coded(colors)) => &colors.codebooks,
-        ("codebook_scales", PackedColors::Coded(colors)) => cast_slice(&colors.scales),
+        ("codebooks", PackedColors::Coded(colors)) => &colors.codebooks.words,
+        ("codebook_scales", PackedColors::Coded(colors)) => cast_slice(&colors.codebooks.scales),
         _ => &[],
     }
 }
@@ -225,8 +232,10 @@ fn words_of_packed_mut<'a>(packed: &'a mut PackedScene, name: &str) -> &'a mut [
         ("packed_mean" | "packed_motion" | "packed_shape", _) => cast_slice_mut(&mut packed.records),
         ("packed_ranges", _) => cast_slice_mut(&mut packed.ranges),
         ("color_base" | "color_codes", PackedColors::Coded(colors)) => cast_slice_mut(&mut colors.records),
-        ("codebooks", PackedColors::Coded(colors)) => &mut colors.codebooks,
-        ("codebook_scales", PackedColors::Coded(colors)) => cast_slice_mut(&mut colors.scales),
+        ("codebooks", PackedColors::Coded(colors)) => &mut Arc::make_mut(&mut colors.codebooks).words,
+        ("codebook_scales", PackedColors::Coded(colors)) => {
+            cast_slice_mut(&mut Arc::make_mut(&mut colors.codebooks).scales)
+        }
         _ => &mut [],
     }
 }

@@ -32,15 +32,17 @@ pub use header::{EnvironmentSize, Header, StoredFilter, StoredForm, StoredLevel}
 pub(crate) use reading::Reading;
 pub use section::Section;
 
+use super::import::source::Beside;
 use super::options::ReadOptions;
-use crate::scene::GaussianScene;
+use crate::scene::{ChunkTable, ColorCodebooks, GaussianScene};
 use attribute::Attribute;
 use colliders::ColliderWords;
 use header::LEVEL;
 use memory_limit::{MemoryLimit, of_level};
 use rayon::prelude::*;
 use serde::Serialize;
-use std::io::{BufReader, Read, Seek, Write};
+use std::io::{BufReader, Cursor, Read, Seek, Write};
+use std::sync::Arc;
 
 /// Extensions of packages, without the dot.
 pub(crate) const EXTENSIONS: &[&str] = &["gs4d"];
@@ -95,8 +97,29 @@ impl PackageInfo {
 /// # Errors
 /// [`PackageError::Inconsistent`] for a scene whose parts do not fit together, [`PackageError::TooLarge`] for a scene
 /// that compresses so well that a reader would refuse it as a decompression bomb, and errors of the writer.
-pub fn write<W: Write>(mut writer: W, scene: &GaussianScene, settings: &WriteSettings) -> Result<(), PackageError> {
-    let mut header = Header::of(scene);
+pub fn write<W: Write>(writer: W, scene: &GaussianScene, settings: &WriteSettings) -> Result<(), PackageError> {
+    write_with(writer, scene, settings, false)
+}
+
+/// As [`write`], of a chunk file: the codebooks of its colors are left to the index of the capture.
+///
+/// # Errors
+/// As [`write`].
+pub(crate) fn write_chunk<W: Write>(
+    writer: W,
+    scene: &GaussianScene,
+    settings: &WriteSettings,
+) -> Result<(), PackageError> {
+    write_with(writer, scene, settings, true)
+}
+
+fn write_with<W: Write>(
+    mut writer: W,
+    scene: &GaussianScene,
+    settings: &WriteSettings,
+    codebooks_in_index: bool,
+) -> Result<(), PackageError> {
+    let mut header = Header::of(scene, codebooks_in_index);
     let colliders = scene.colliders.as_deref().map(ColliderWords::of).unwrap_or_default();
     header.check_writable(scene, &colliders)?;
     let level = settings.level.clamp(1, 19);
@@ -149,16 +172,60 @@ pub fn write<W: Write>(mut writer: W, scene: &GaussianScene, settings: &WriteSet
 /// # Errors
 /// One [`PackageError`] for each kind of damage.
 pub fn read<R: Read + Seek>(reader: R) -> Result<GaussianScene, PackageError> {
-    Reading::new(reader)?.finish()
+    Reading::new(reader)?.finish(None)
 }
 
-/// Reads a scene as [`read`] does, and replaces its settings by the options that are given.
+/// Reads a scene as [`read`] does, and replaces its settings by the options that are given. The codebooks of a chunk
+/// file are in a file beside it.
 ///
 /// # Errors
 /// As [`read`]; options that are invalid or contradict the stored Gaussians.
-pub(super) fn read_with<R: Read + Seek>(reader: R, options: &ReadOptions) -> Result<GaussianScene, PackageError> {
+pub(super) fn read_with<R: Read + Seek>(
+    reader: R,
+    beside: &dyn Beside,
+    options: &ReadOptions,
+) -> Result<GaussianScene, PackageError> {
     options.check()?;
-    Reading::new(reader)?.finish_with(options)
+    finish_beside(Reading::new(reader)?, beside, options)
+}
+
+/// Returns the scene of a package of which some steps have been read, with its settings replaced by the options that are
+/// given. The codebooks that a chunk file needs, and that are no option, are in a file beside it.
+///
+/// # Errors
+/// As [`read`]; options that contradict the stored Gaussians.
+pub(super) fn finish_beside<R: Read + Seek>(
+    reading: Reading<R>,
+    beside: &dyn Beside,
+    options: &ReadOptions,
+) -> Result<GaussianScene, PackageError> {
+    let codebooks = match &options.codebooks {
+        None if reading.needs_codebooks() => Some(codebooks_beside(beside)?),
+        given => given.clone(),
+    };
+    reading.finish_with(codebooks.as_ref(), options)
+}
+
+/// Reads a chunk file with the codebooks of its capture.
+///
+/// # Errors
+/// As [`read`].
+pub(crate) fn read_chunk<R: Read + Seek>(
+    reader: R,
+    codebooks: Option<&Arc<ColorCodebooks>>,
+) -> Result<GaussianScene, PackageError> {
+    Reading::new(reader)?.finish(codebooks)
+}
+
+/// Reads the codebooks of the index beside chunk files.
+///
+/// # Errors
+/// [`PackageError::CodebooksOfIndex`].
+fn codebooks_beside(beside: &dyn Beside) -> Result<Arc<ColorCodebooks>, PackageError> {
+    let unusable = |fault: String| PackageError::CodebooksOfIndex { fault };
+    let bytes = beside.read(ChunkTable::INDEX).map_err(|error| unusable(format!("which cannot be read: {error}")))?;
+    let index = read(Cursor::new(bytes)).map_err(|error| unusable(format!("which cannot be read: {error}")))?;
+    index.form.codebooks().cloned().ok_or_else(|| unusable("which has no codebooks".to_owned()))
 }
 
 /// Reads the header and verifies every checksum, without building the scene.

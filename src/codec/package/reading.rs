@@ -13,7 +13,7 @@ use super::section::{Body, Section};
 use super::{layout, options, planes};
 use crate::codec::options::ReadOptions;
 use crate::codec::zstd_frames::{Decoder, Memory};
-use crate::scene::{GaussianScene, Level, RuntimeScene, SceneForm};
+use crate::scene::{ColorCodebooks, Form, GaussianScene, Level, PackedColors, RuntimeScene, SceneForm};
 use std::io::{BufReader, Cursor, Read, Seek};
 use std::sync::Arc;
 
@@ -116,12 +116,21 @@ impl<R: Read + Seek> Reading<R> {
         ((read - left.unwrap_or(0.0)) / all.max(1.0)) as f32
     }
 
-    /// Does all remaining steps, and returns the scene, whose parts fit together.
+    /// Returns whether the package is a chunk file whose codebooks are in the index beside it.
+    pub(crate) fn needs_codebooks(&self) -> bool {
+        self.sections.header.codebooks_in_index
+    }
+
+    /// Does all remaining steps, and returns the scene, whose parts fit together. `codebooks` are those of the index, if
+    /// the package [needs](Self::needs_codebooks) them.
     ///
     /// # Errors
-    /// A damaged section; parts that contradict each other.
-    pub(crate) fn finish(mut self) -> Result<GaussianScene, PackageError> {
+    /// A damaged section; parts that contradict each other; codebooks that are missing, or are others.
+    pub(crate) fn finish(mut self, codebooks: Option<&Arc<ColorCodebooks>>) -> Result<GaussianScene, PackageError> {
         while self.advance(usize::MAX)? {}
+        if self.needs_codebooks() {
+            supply(&mut self.sections.scene, codebooks)?;
+        }
         let Self { mut sections, levels, .. } = self;
         let sized = std::mem::take(&mut sections.header.levels).into_iter().zip(levels);
         let levels = sized.map(|(stored, scene)| Level { pixels: stored.pixels, scene: Arc::new(scene) }).collect();
@@ -134,11 +143,28 @@ impl<R: Read + Seek> Reading<R> {
     ///
     /// # Errors
     /// As [`finish`](Self::finish); options that contradict the stored Gaussians.
-    pub(crate) fn finish_with(self, options: &ReadOptions) -> Result<GaussianScene, PackageError> {
-        let mut scene = self.finish()?;
+    pub(super) fn finish_with(
+        self,
+        codebooks: Option<&Arc<ColorCodebooks>>,
+        options: &ReadOptions,
+    ) -> Result<GaussianScene, PackageError> {
+        let mut scene = self.finish(codebooks)?;
         options::apply(options, &mut scene)?;
         Ok(scene)
     }
+}
+
+/// Gives a scene that has been read the codebooks of an index.
+fn supply(scene: &mut GaussianScene, codebooks: Option<&Arc<ColorCodebooks>>) -> Result<(), PackageError> {
+    let fault = |fault: &str| PackageError::CodebooksOfIndex { fault: fault.to_owned() };
+    let codebooks = codebooks.ok_or_else(|| fault("which is not there: keep them in one folder"))?;
+    let SceneForm::Ready(Form::Packed(packed)) = &mut scene.form else { return Ok(()) };
+    let PackedColors::Coded(colors) = &mut packed.colors else { return Ok(()) };
+    if colors.codebooks.entries != codebooks.entries {
+        return Err(fault("which is that of another capture: keep the files of each in a folder of its own"));
+    }
+    colors.codebooks = codebooks.clone();
+    Ok(())
 }
 
 impl Sections {

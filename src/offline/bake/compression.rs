@@ -42,7 +42,7 @@ pub(super) fn compress(
     let settings = inputs.settings;
     let key = if inputs.tunes().is_some() { key.with(inputs.images_key()) } else { key };
     let key =
-        key.and(&format!("{:?} {:?} {:?} {}", settings.quality, settings.level, inputs.tunes(), settings.progressive));
+        key.and(&format!("{:?} {:?} {:?} {:?}", settings.quality, settings.level, inputs.tunes(), settings.order));
     let (Package(bytes), _) = stages.run(
         "compress",
         key,
@@ -55,8 +55,8 @@ pub(super) fn compress(
                 SceneForm::Trained(_) | SceneForm::Ready(Form::Sliced(_)) => {
                     let runtime = scene.into_runtime();
                     let runtime = runtime.map_err(|error| FileError::at(&settings.checkpoint, error))?;
-                    let progressive = settings.progressive;
-                    pack(runtime, &CompressSettings { progressive, ..CompressSettings::from(settings.quality) })?.0
+                    let order = settings.order.clone();
+                    pack(runtime, &CompressSettings { order, ..CompressSettings::from(settings.quality) })?.0
                 }
             };
             let mut bytes = Vec::new();

@@ -5,7 +5,7 @@
 
 use super::BakeError;
 use crate::codec::package;
-use crate::offline::compress::{CompressSettings, Quality, compress};
+use crate::offline::compress::{CompressSettings, PackedOrder, Quality, compress};
 use crate::offline::prune::select::select;
 use crate::offline::work::{Progress, write_settings};
 use crate::scene::{GaussianScene, TemporalFilter};
@@ -25,8 +25,8 @@ pub(crate) struct Packages<'a> {
     /// Number of key-frames of the temporal filter.
     pub key_frames: u32,
     pub quality: Quality,
-    /// Whether the Gaussians are in layers.
-    pub progressive: bool,
+    /// The order of the Gaussians.
+    pub order: &'a PackedOrder,
     /// zstd level; `None`: that of [`write_settings`].
     pub level: Option<i32>,
     /// Whether the Gaussians are trained: the sizes of codebooks then follow their number.
@@ -44,7 +44,7 @@ impl Packages<'_> {
             true => CompressSettings::suiting(self.quality, kept.len()),
             false => CompressSettings::from(self.quality),
         };
-        let options = CompressSettings { progressive: self.progressive, ..options };
+        let options = CompressSettings { order: self.order.clone(), ..options };
         let (compressed, _) = compress(scene.into_runtime()?, &options)?;
         let mut bytes = Vec::new();
         package::write(&mut bytes, &compressed, &write_settings(&compressed.form, self.level))?;

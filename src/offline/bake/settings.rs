@@ -3,7 +3,7 @@
 //! In: paths, goals and choices of the user. Out: [`BakeSettings`], whose files can be checked before anything is
 //! computed.
 
-use crate::offline::compress::Quality;
+use crate::offline::compress::{PackedOrder, Quality};
 use crate::offline::dataset::splits::SplitOptions;
 use crate::offline::filter::temporal_filter::KeyFrames;
 use crate::offline::prune::search::{Goal, ScoreChoice};
@@ -47,8 +47,8 @@ pub struct BakeSettings {
     pub fine_tune: Option<FineTuneSettings>,
     /// The quality of the compressed capture.
     pub quality: Quality,
-    /// Whether the Gaussians of the package are in layers, the most important ones first.
-    pub progressive: bool,
+    /// The order of the Gaussians of the package.
+    pub order: PackedOrder,
     /// zstd level of the package, 1 (fast) to 19 (small); `None` uses the default of `write_settings`.
     pub level: Option<i32>,
     /// Whether images are used without a check that they show the capture.

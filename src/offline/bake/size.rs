@@ -96,8 +96,8 @@ pub(super) fn require_least(
     is_trained: bool,
 ) -> Result<(), BakeError> {
     let Goal::Size(limit) = settings.goal else { return Ok(()) };
-    let BakeSettings { quality, progressive, level, .. } = *settings;
-    let least = Packages { scene, key_frames, quality, progressive, level, is_trained }.size_of(&[])?;
+    let BakeSettings { quality, ref order, level, .. } = *settings;
+    let least = Packages { scene, key_frames, quality, order, level, is_trained }.size_of(&[])?;
     match least > limit {
         true => Err(too_small(settings, limit, &format!("a package without Gaussians has {least}")).into()),
         false => Ok(()),
@@ -128,8 +128,8 @@ pub(super) fn count_of_size(
 fn size_of(inputs: &Inputs<'_>, kept: &[u32]) -> Result<u64, BakeError> {
     let (scene, settings) = (&inputs.subject.scene, inputs.settings);
     let (key_frames, is_trained) = (inputs.key_frames(), inputs.tunes().is_some());
-    let BakeSettings { quality, progressive, level, .. } = *settings;
-    Packages { scene, key_frames, quality, progressive, level, is_trained }.size_of(kept)
+    let BakeSettings { quality, ref order, level, .. } = *settings;
+    Packages { scene, key_frames, quality, order, level, is_trained }.size_of(kept)
 }
 
 /// Returns the error for a limit that no package meets; `found` describes the smallest package.

@@ -79,8 +79,8 @@ pub(super) fn with_codebooks(
     let images = inputs.images(progress)?;
     let Engine::Gpu(headless) = &mut *inputs.engine else { return Ok(scene) };
     let compress = Some((quality, tuning.steps / CODING));
-    let progressive = inputs.settings.progressive;
-    let coding = FineTuneSettings { steps: 0, compress, progressive, ..tuning };
+    let order = inputs.settings.order.clone();
+    let coding = FineTuneSettings { steps: 0, compress, order, ..tuning };
     let resume = Resume { store: &inputs.store, key, every: coding.evaluate_every };
     Ok(train::fine_tune(headless, scene, &images, &coding, Some(resume), progress)?.scene)
 }

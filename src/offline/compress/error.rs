@@ -3,8 +3,8 @@
 //! In: what is wrong with a scene or its settings. Out: [`CompressError`], which names the fault and the remedy.
 
 use crate::gaussian::InvalidGaussian;
-use crate::scene::PackError;
 use crate::scene::packed::MAX_STAGES;
+use crate::scene::{ChunkTable, PackError};
 
 /// Why a scene cannot be compressed.
 #[derive(Debug, thiserror::Error)]
@@ -22,6 +22,24 @@ pub enum CompressError {
     /// Colors cannot be rounded to multiples of this.
     #[error("colors cannot be rounded to multiples of {0:?}: the step must be 0, or a number from {least:e} up", least = f32::MIN_POSITIVE)]
     ColorStep(f32),
+    /// The capture would be cut into more stretches of time than an index may have.
+    #[error(
+        "stretches of {seconds} seconds are more than {} of the capture: choose longer ones",
+        ChunkTable::MOST_STRETCHES
+    )]
+    ManyStretches {
+        /// Length of a stretch, seconds.
+        seconds: f32,
+    },
+    /// The capture would be cut into more chunk files than an index may have.
+    #[error(
+        "the capture would be cut into {found} chunk files, more than {}: choose longer stretches",
+        ChunkTable::MOST_FILES
+    )]
+    ManyChunks {
+        /// Number of chunk files.
+        found: usize,
+    },
     /// The values of the scene have too large a range.
     #[error(
         "the scene does not fit the packed form ({0}): some of its values are too large or too far apart; choose the quality lossless, or \

@@ -26,4 +26,4 @@ pub use pack::{CompressReport, compress};
 pub(crate) use pack::{compress_tied, compress_with, require_unpacked};
 pub(crate) use promise::broken_promises;
 pub(crate) use roundings::roundings;
-pub use settings::{CompressSettings, Quality};
+pub use settings::{CompressSettings, PackedOrder, Quality};

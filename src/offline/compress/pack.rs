@@ -3,17 +3,22 @@
 //! In: a scene ready to draw, [`CompressSettings`], codebooks if they have been trained before. Out: the packed scene,
 //! and a [`CompressReport`].
 //!
-//! The Gaussians are sorted in Morton order, perhaps in layers, and encoded as records (`scene::packed`); their colors
+//! The Gaussians are sorted in Morton order, perhaps in layers or in the order of chunk files, and encoded as records (`scene::packed`); their colors
 //! are rounded, or coded by codebooks.
 
 use super::codebook::Centers;
 use super::coded_colors::coded_colors;
-use super::{CompressError, CompressSettings};
+use super::{CompressError, CompressSettings, PackedOrder};
+use crate::gaussian::Gaussian;
+use crate::offline::segments::{LEAST_PACKED, lives, parts};
 use crate::scene::packed::MAX_STAGES;
 use crate::scene::packed::anchor::move_near;
 use crate::scene::packed::order::{Order, is_filler};
-use crate::scene::packed::pack::pack_ordered;
-use crate::scene::{Form, GaussianScene, PackedColors, Packing, RuntimeScene, SceneForm, TrainedWith};
+use crate::scene::packed::pack::{encode_ordered, pack_ordered};
+use crate::scene::{
+    ChunkTable, CodedColors, FilterKind, Form, GaussianScene, PackedColors, Packing, RuntimeScene, SceneForm, Sliced,
+    TrainedWith,
+};
 use ndarray::Array2;
 use serde::Serialize;
 
@@ -87,8 +92,7 @@ pub(crate) fn compress_tied(
     books: &Centers,
 ) -> Result<(GaussianScene, CompressReport), CompressError> {
     let scene = anchored(scene, settings);
-    let Form::Sliced(sliced) = &scene.form else { return Err(CompressError::AlreadyPacked) };
-    let order = Order::of(&sliced.gaussians, settings.progressive).indices;
+    let order = order_of(&scene, settings)?.indices;
     let codes = books.codes.iter().map(|codes| order.iter().map(|&index| codes[index as usize]).collect());
     let ordered = Centers { entries: books.entries.clone(), codes: codes.collect() };
     compress_by(scene, settings, |_, _, _| ordered)
@@ -102,6 +106,29 @@ fn anchored(mut scene: RuntimeScene, settings: &CompressSettings) -> RuntimeScen
         move_near(&mut sliced.gaussians, time_interval, marginal_cutoff);
     }
     scene
+}
+
+/// Returns the order of the Gaussians of a scene, whose temporal means are those that will be packed.
+fn order_of(scene: &RuntimeScene, settings: &CompressSettings) -> Result<Order, CompressError> {
+    let Form::Sliced(Sliced { gaussians, .. }) = &scene.form else { return Err(CompressError::AlreadyPacked) };
+    let (PackedOrder::Chunks(cut), Some(bits)) = (&settings.order, &settings.geometry) else {
+        return Ok(Order::of(gaussians, settings.order == PackedOrder::Progressive));
+    };
+    let stretches = cut.stretches(scene.playback.duration_seconds);
+    let stretches = stretches.ok_or(CompressError::ManyStretches { seconds: cut.seconds })?;
+    // Lifespans are rounded, in any order in the same way: no Gaussian may be drawn outside the stretches of its file.
+    let (every, no_colors) =
+        ((0..gaussians.len() as u32).collect::<Vec<u32>>(), PackedColors::Coded(CodedColors::default()));
+    let packed = encode_ordered(gaussians, &every, bits, no_colors, [0.0; 2], scene.trained_with.time_span());
+    let rounded: Vec<Gaussian> = (0..packed.len()).map(|index| packed.gaussian(index)).collect();
+    // A support filter is computed again, from the lifespans.
+    let filter = scene.filter.as_ref().filter(|filter| filter.kind != FilterKind::Support);
+    let lives = lives(&rounded, filter, &scene.trained_with, stretches);
+    let parts = parts(gaussians, &lives, stretches, &cut.layers, LEAST_PACKED);
+    match parts.len() > ChunkTable::MOST_FILES {
+        true => Err(CompressError::ManyChunks { found: parts.len() }),
+        false => Ok(Order::of_parts(gaussians, stretches, parts)),
+    }
 }
 
 /// As [`compress`], for a scene that is [`anchored`]. `train` returns codebooks, given rows of coefficients, their
@@ -126,19 +153,19 @@ fn compress_by(
         return Ok((scene.into(), report));
     };
     if books.is_empty() {
-        let packed =
-            scene.pack(&Packing { bits: *bits, color_step: settings.color_step, progressive: settings.progressive })?;
+        let packing = Packing { bits: *bits, color_step: settings.color_step, ..Packing::default() };
+        let packed = scene.pack_in(&packing, |scene| order_of(scene, settings))?;
         (report.memory_after, report.fillers) = (packed.size(), packed.len() - report.gaussians);
         return Ok((packed.into(), report));
     }
-    let order = Order::of(&sliced.gaussians, settings.progressive);
+    let order = order_of(&scene, settings)?;
     let places = &order.indices;
     let weight =
         |index: usize| settings.weights.as_ref().map_or(sliced.gaussians[index].opacity, |weights| weights[index]);
     let weight_at = |place: usize| if is_filler(places, place) { 0.0 } else { weight(places[place] as usize) };
     let weights: Vec<f32> = (0..places.len()).map(weight_at).collect();
     let (coded, base) = coded_colors(&sliced.harmonics, places, bits, |rest| train(rest, &weights, books));
-    report.codebooks.clone_from(&coded.entries);
+    report.codebooks.clone_from(&coded.codebooks.entries);
     let packed = pack_ordered(scene, bits, &order, PackedColors::Coded(coded), base)?;
     (report.memory_after, report.fillers) = (packed.size(), packed.len() - report.gaussians);
     Ok((packed.into(), report))

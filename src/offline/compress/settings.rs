@@ -2,6 +2,7 @@
 //!
 //! In: a [`Quality`]. Out: its [`CompressSettings`]. `CONTRIBUTING.md` lists the files that a further option changes.
 
+use crate::offline::segments::Cut;
 use crate::scene::{Bits, Packing};
 use serde::{Deserialize, Serialize};
 
@@ -35,6 +36,19 @@ impl Quality {
     ];
 }
 
+/// The order in which quantized Gaussians are stored. Default: [`Spatial`](Self::Spatial).
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PackedOrder {
+    /// Neighbors in space follow each other.
+    #[default]
+    Spatial,
+    /// In layers, the most important Gaussians first ([`Packing::progressive`]).
+    Progressive,
+    /// That of chunk files, which have layers: the capture can be cut into them without a change of its values.
+    Chunks(Cut),
+}
+
 /// Every option of compression.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CompressSettings {
@@ -45,8 +59,8 @@ pub struct CompressSettings {
     /// Without codebooks, coefficients are rounded to multiples of this, so that they compress; 0 keeps them as they
     /// are. A step above 0 must be a normal number: multiples of a subnormal one are not accurate.
     pub color_step: f32,
-    /// Whether quantized Gaussians are in layers, the most important ones first ([`Packing::progressive`]).
-    pub progressive: bool,
+    /// The order of quantized Gaussians.
+    pub order: PackedOrder,
     /// Weight of each Gaussian's color, not negative, in the order of the scene; `None` weighs by opacity.
     #[serde(skip)]
     pub weights: Option<Vec<f32>>,
@@ -98,7 +112,7 @@ impl From<Quality> for CompressSettings {
             Quality::Lossless => (None, Vec::new()),
         };
         let color_step = if quality == Quality::VisuallyLossless { Packing::default().color_step } else { 0.0 };
-        Self { geometry, codebooks, color_step, progressive: false, weights: None }
+        Self { geometry, codebooks, color_step, order: PackedOrder::Spatial, weights: None }
     }
 }
 

@@ -8,9 +8,6 @@
 use std::collections::BTreeMap;
 use std::ops::Bound;
 
-/// Runs and layers of fewer Gaussians become part of others: a file costs more than they do.
-pub(super) const LEAST: usize = 256;
-
 /// The Gaussians of some chunks that follow one another.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Run {
@@ -21,8 +18,9 @@ pub(super) struct Run {
 }
 
 /// Returns the runs of Gaussians that are alive in these chunks, from the first to the last; by their first chunk, the
-/// shorter before the longer. `count` is the number of chunks.
-pub(super) fn runs(lives: impl Iterator<Item = [u32; 2]>, count: u32) -> Vec<Run> {
+/// shorter before the longer. `count` is the number of chunks. Runs of fewer Gaussians than `least` become part of
+/// longer ones.
+pub(super) fn runs(lives: impl Iterator<Item = [u32; 2]>, count: u32, least: usize) -> Vec<Run> {
     // By length, then by first chunk.
     let mut runs = BTreeMap::<(u32, u32), Vec<u32>>::new();
     for (index, life) in lives.enumerate() {
@@ -35,7 +33,7 @@ pub(super) fn runs(lives: impl Iterator<Item = [u32; 2]>, count: u32) -> Vec<Run
     };
     while let Some((at, gaussians)) = next(&runs, before) {
         before = at;
-        if gaussians >= LEAST || at.0 == count {
+        if gaussians >= least || at.0 == count {
             continue;
         }
         let few = runs.remove(&at).unwrap_or_default();
@@ -86,6 +84,8 @@ fn longer((length, first): (u32, u32), count: u32) -> [u32; 2] {
 mod tests {
     use super::*;
 
+    const LEAST: usize = 256;
+
     #[test]
     fn a_cover_is_at_most_four_times_as_long_as_a_life() {
         for count in [1, 2, 7, 8, 30] {
@@ -108,7 +108,7 @@ mod tests {
                 [first, (first + index / 32 % 9).min(31)]
             })
             .collect();
-        let runs = runs(lives.iter().copied(), 32);
+        let runs = runs(lives.iter().copied(), 32, LEAST);
         let mut all: Vec<u32> = runs.iter().flat_map(|run| run.gaussians.clone()).collect();
         all.sort_unstable();
         assert!(all.into_iter().eq(0..lives.len() as u32), "each Gaussian once");
@@ -128,7 +128,7 @@ mod tests {
     #[test]
     fn small_runs_become_part_of_longer_ones() {
         let lives = [[6, 6], [0, 0], [3, 4]];
-        let runs = runs(lives.into_iter(), 7);
+        let runs = runs(lives.into_iter(), 7, LEAST);
         assert_eq!(runs, [Run { chunks: [0, 6], gaussians: vec![0, 1, 2] }], "three Gaussians are one run");
     }
 }

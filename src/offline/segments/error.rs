@@ -77,6 +77,12 @@ pub enum SegmentsError {
         /// The segment.
         path: PathBuf,
     },
+    /// Packed Gaussians whose order is not that of chunk files.
+    #[error("{}: is packed, and was not cut into chunks when it was compressed", .path.display())]
+    NoRuns {
+        /// The capture.
+        path: PathBuf,
+    },
     /// Something that all segments must have in common.
     #[error("{}: its {} is not that of {}", .path.display(), .what.name(), .first.display())]
     Differs {

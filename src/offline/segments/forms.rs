@@ -1,11 +1,12 @@
 //! Gaussians of two segments in one form.
 //!
 //! In: a form, its place on the clock of all, a shift in space. Out: the form in the time and the space of all; the forms
-//! of several segments as one.
+//! of several segments as one, and of packed chunks, whose values stay as they are.
 
 use super::clock::Place;
 use crate::gaussian::{Gaussian, Harmonics, Parameters};
-use crate::scene::{Form, SceneForm, Sliced, Trained};
+use crate::scene::packed::{BLOCK, SHARED_RANGES};
+use crate::scene::{Form, PackedColors, PackedScene, RunPart, Runs, SceneForm, Sliced, Trained};
 
 /// Moves Gaussians to the clock of all and by `shift`, capture units. Values that do not move keep their bits. Gaussians
 /// in the trained form are moved only, not stretched in time: their clock must have the unit of the clock of all.
@@ -55,6 +56,42 @@ pub(super) fn append(all: &mut SceneForm, part: SceneForm) -> bool {
                 return true;
             }
             false
+        }
+        (SceneForm::Ready(Form::Packed(all)), SceneForm::Ready(Form::Packed(part))) => append_packed(all, part),
+        _ => false,
+    }
+}
+
+/// Appends packed Gaussians that are drawn by the same ranges and codebooks, and their runs.
+fn append_packed(all: &mut PackedScene, mut part: PackedScene) -> bool {
+    let count = all.len();
+    let (Some(runs), Some(own)) = (&mut all.runs, part.runs) else { return false };
+    let shared = |ranges: &[[f32; 4]]| {
+        ranges.iter().take(SHARED_RANGES).map(|range| range.map(f32::to_bits)).collect::<Vec<_>>()
+    };
+    let is_alike =
+        count.is_multiple_of(BLOCK) && runs.stretches == own.stretches && shared(&all.ranges) == shared(&part.ranges);
+    if !is_alike || !append_packed_colors(&mut all.colors, part.colors) {
+        return false;
+    }
+    let Runs { parts, .. } = own;
+    runs.parts.extend(parts.into_iter().map(|part| RunPart { end: count + part.end, ..part }));
+    all.layers = runs.layers();
+    all.records.append(&mut part.records);
+    all.ranges.extend(part.ranges.into_iter().skip(SHARED_RANGES));
+    true
+}
+
+fn append_packed_colors(all: &mut PackedColors, part: PackedColors) -> bool {
+    match (all, part) {
+        (PackedColors::Whole(all), PackedColors::Whole(part)) => append_colors(all, part),
+        (PackedColors::Coded(all), PackedColors::Coded(mut part)) => {
+            let degrees = (all.degree, all.degree_t) == (part.degree, part.degree_t);
+            let is_alike = degrees && all.codebooks == part.codebooks;
+            if is_alike {
+                all.records.append(&mut part.records);
+            }
+            is_alike
         }
         _ => false,
     }

@@ -3,11 +3,12 @@
 //! In: the Gaussians of a run, the importance of each, the shares of the layers ([`LayerShares`]). Out: the Gaussians of
 //! each layer, so that a player that has the first layers of a run shows most of what is there.
 
-use super::covers::LEAST;
 use crate::scene::ChunkTable;
+use serde::{Deserialize, Serialize};
 
 /// The shares of the layers, most important first: whole percentages, 100 in all. Default: 25, 25 and 50.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "Vec<u32>", into = "Vec<u32>")]
 pub struct LayerShares(Vec<u32>);
 
 impl LayerShares {
@@ -29,15 +30,30 @@ impl LayerShares {
     }
 }
 
+impl TryFrom<Vec<u32>> for LayerShares {
+    type Error = &'static str;
+
+    fn try_from(percentages: Vec<u32>) -> Result<Self, Self::Error> {
+        Self::new(percentages)
+            .ok_or("the shares of layers are not whole percentages above 0, 100 in all, of 16 at most")
+    }
+}
+
+impl From<LayerShares> for Vec<u32> {
+    fn from(shares: LayerShares) -> Self {
+        shares.0
+    }
+}
+
 impl Default for LayerShares {
     fn default() -> Self {
         Self(vec![25, 25, 50])
     }
 }
 
-/// Returns the layers of the Gaussians of a run, most important first; the Gaussians of each ascend. A layer of few
-/// Gaussians is part of the one before it, the first of the one after it.
-pub(super) fn layers(gaussians: &[u32], importances: &[f32], shares: &LayerShares) -> Vec<Vec<u32>> {
+/// Returns the layers of the Gaussians of a run, most important first; the Gaussians of each ascend. A layer of
+/// fewer Gaussians than `least` is part of the one before it, the first of the one after it.
+pub(super) fn layers(gaussians: &[u32], importances: &[f32], shares: &LayerShares, least: usize) -> Vec<Vec<u32>> {
     let mut order = gaussians.to_vec();
     let importance = |index: u32| importances[index as usize];
     // Of equal importance the earlier first: layers that follow one another are cut at the same places again.
@@ -46,7 +62,7 @@ pub(super) fn layers(gaussians: &[u32], importances: &[f32], shares: &LayerShare
     for end in shares.ends(order.len()) {
         let own = &order[start..end];
         match layers.last_mut() {
-            Some(before) if before.len() < LEAST || own.len() < LEAST => before.extend_from_slice(own),
+            Some(before) if before.len() < least || own.len() < least => before.extend_from_slice(own),
             _ => layers.push(own.to_vec()),
         }
         start = end;
@@ -59,13 +75,15 @@ pub(super) fn layers(gaussians: &[u32], importances: &[f32], shares: &LayerShare
 mod tests {
     use super::*;
 
+    const LEAST: usize = 256;
+
     fn shares(percentages: &[u32]) -> LayerShares {
         LayerShares::new(percentages.to_vec()).expect("shares of 100 in all")
     }
 
     fn lengths(count: u32, percentages: &[u32]) -> Vec<usize> {
         let gaussians: Vec<u32> = (0..count).collect();
-        layers(&gaussians, &vec![1.0; count as usize], &shares(percentages)).iter().map(Vec::len).collect()
+        layers(&gaussians, &vec![1.0; count as usize], &shares(percentages), LEAST).iter().map(Vec::len).collect()
     }
 
     #[test]
@@ -92,7 +110,7 @@ mod tests {
         let importances: Vec<f32> =
             (0..4000_u32).map(|index| (index.wrapping_mul(2_654_435_761) >> 29) as f32).collect();
         let gaussians: Vec<u32> = (0..4000).filter(|index| index % 3 > 0).collect();
-        let cut = layers(&gaussians, &importances, &LayerShares::default());
+        let cut = layers(&gaussians, &importances, &LayerShares::default(), LEAST);
         assert_eq!(cut.len(), 3, "three layers");
         let importance = |index: &u32| importances[*index as usize];
         for pair in cut.windows(2) {
@@ -105,7 +123,7 @@ mod tests {
         let joined = cut.concat();
         let moved: Vec<f32> = joined.iter().map(importance).collect();
         let places: Vec<u32> = (0..joined.len() as u32).collect();
-        let again = layers(&places, &moved, &LayerShares::default());
+        let again = layers(&places, &moved, &LayerShares::default(), LEAST);
         let again: Vec<Vec<u32>> =
             again.iter().map(|layer| layer.iter().map(|place| joined[*place as usize]).collect()).collect();
         assert_eq!(again, cut, "many are equally important, and none changes its layer");

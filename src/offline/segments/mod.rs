@@ -14,26 +14,31 @@
 //! | `files` | the names of chunk files, and which paths are chunks of one capture |
 //! | `covers` | runs: the Gaussians of a stretch of chunks |
 //! | `layers` | the Gaussians of a run by importance |
+//! | `cut`, `parts` | how a capture is cut, and the Gaussians of each chunk file |
 //! | `split` | chunk files of a capture, and their index |
 //! | `unite` | the capture of chunks |
 
 mod alike;
 mod clock;
 mod covers;
+mod cut;
 mod error;
 mod files;
 mod forms;
 mod join;
 mod layers;
+mod parts;
 mod segment;
 mod split;
 mod unite;
 mod windows;
 
+pub use cut::Cut;
 pub use error::{SegmentsError, Shared};
 pub use files::{Source, sources};
 pub use join::{Joined, JoinedSegment, Times, join};
 pub use layers::LayerShares;
+pub(crate) use parts::{LEAST_PACKED, lives, parts};
 pub use segment::Segment;
 pub use split::{Chunk, Chunks, Split, other_chunk};
 pub use unite::unite;

@@ -28,6 +28,11 @@ impl Segment {
         SegmentsError::Differs { path: self.path.clone(), first: first.path.clone(), what }
     }
 
+    /// Returns whether it is packed in the order of chunk files.
+    pub fn has_runs(&self) -> bool {
+        matches!(&self.scene.form, SceneForm::Ready(Form::Packed(packed)) if packed.runs.is_some())
+    }
+
     /// Checks that Gaussians can be cut and joined without rounding them again.
     pub(super) fn require_unpacked(&self) -> Result<(), SegmentsError> {
         match &self.scene.form {

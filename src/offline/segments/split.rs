@@ -1,20 +1,17 @@
 //! A capture as chunk files.
 //!
-//! In: a capture, a number of stretches of time, the shares of its layers. Out: a file for each layer of each run of
+//! In: a capture, and how it is cut; a packed capture has been cut when it was compressed. Out: a file for each layer of each run of
 //! Gaussians: a capture with the clock of the whole, of which any player shows what it has. Together they are the whole
 //! capture: see `unite`. The index beside them has everything but the Gaussians, and the table of the files.
 
-use super::covers::runs;
 use super::error::SegmentsError;
 use super::files::chunks_in;
-use super::layers::{LayerShares, layers};
+use super::layers::LayerShares;
+use super::parts::{LEAST, lives, parts};
 use super::segment::Segment;
-use super::windows::{hulls, intervals};
-use crate::gaussian::Gaussian;
-use crate::offline::prune::select::select;
-use crate::offline::work::{FileError, Progress, proceed, save, write_settings};
-use crate::scene::{ChunkFile, ChunkTable, GaussianScene, TemporalFilter};
-use rayon::prelude::*;
+use crate::offline::work::{FileError, Progress, proceed, save, save_chunk, write_settings};
+use crate::scene::packed::runs::Part;
+use crate::scene::{ChunkFile, ChunkTable, Form, GaussianScene, PackedScene, Runs, SceneForm};
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -42,20 +39,11 @@ pub struct Chunks {
     pub files: Vec<Chunk>,
 }
 
-/// The Gaussians of a chunk file.
-#[derive(Debug, Clone, PartialEq, Eq)]
-struct Part {
-    /// The first and the last stretch of time.
-    stretches: [u32; 2],
-    layer: u32,
-    /// Their indices, ascending.
-    gaussians: Vec<u32>,
-}
-
 /// A capture cut into chunks that are not yet written.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Split {
-    /// By first stretch, the shorter before the longer; those of the same stretches by layer.
+    /// By first stretch, the shorter before the longer, those of the same stretches by layer; of a packed capture as in its
+    /// runs.
     parts: Vec<Part>,
     /// Number of stretches of time.
     stretches: u32,
@@ -66,25 +54,35 @@ impl Split {
     /// run of stretches into layers.
     ///
     /// # Errors
-    /// A packed capture, a Gaussian that cannot be drawn, more than [`ChunkTable::MOST_FILES`] files.
+    /// A packed capture ([`of_runs`](Self::of_runs)), a Gaussian that cannot be drawn, more than
+    /// [`ChunkTable::MOST_FILES`] files.
     pub fn of(segment: &Segment, stretches: u32, shares: &LayerShares) -> Result<Self, SegmentsError> {
         segment.require_unpacked()?;
         let stretches = stretches.clamp(1, ChunkTable::MOST_STRETCHES);
-        let gaussians = segment.scene.gaussians().map_err(|error| segment.at(error))?;
-        let importances: Vec<f32> = gaussians.par_iter().map(importance).collect();
-        let runs = runs(lives(&segment.scene, &gaussians, stretches).into_iter(), stretches);
-        drop(gaussians);
-        let parts: Vec<Part> = runs
-            .into_iter()
-            .flat_map(|run| {
-                let part = move |(layer, gaussians)| Part { stretches: run.chunks, layer, gaussians };
-                (0..).zip(layers(&run.gaussians, &importances, shares)).map(part)
-            })
-            .collect();
+        let scene = &segment.scene;
+        let gaussians = scene.gaussians().map_err(|error| segment.at(error))?;
+        let lives = lives(&gaussians, scene.filter.as_ref(), &scene.trained_with, stretches);
+        let parts = parts(&gaussians, &lives, stretches, shares, LEAST);
         match parts.len() > ChunkTable::MOST_FILES {
             true => Err(SegmentsError::ManyChunks { path: segment.path.clone(), found: parts.len() }),
             false => Ok(Self { parts, stretches }),
         }
+    }
+
+    /// Cuts a packed capture as it has been cut when it was compressed: no value changes.
+    ///
+    /// # Errors
+    /// A capture that has no runs.
+    pub fn of_runs(segment: &Segment) -> Result<Self, SegmentsError> {
+        let SceneForm::Ready(Form::Packed(PackedScene { runs: Some(runs), .. })) = &segment.scene.form else {
+            return Err(SegmentsError::NoRuns { path: segment.path.clone() });
+        };
+        let Runs { stretches, .. } = *runs;
+        let parts = runs.ranges().map(|(part, range)| {
+            let gaussians = (range.start as u32..range.end as u32).collect();
+            Part { stretches: part.stretches, layer: part.layer, gaussians }
+        });
+        Ok(Self { parts: parts.collect(), stretches })
     }
 
     /// Returns the chunk files that it will be in. The index [`ChunkTable::INDEX`] is written beside them.
@@ -111,14 +109,14 @@ impl Split {
         let mut files = Vec::with_capacity(self.parts.len());
         for (part, path) in self.parts.iter().zip(self.paths(folder)) {
             proceed(progress)?;
-            let mut scene = select(&segment.scene, &part.gaussians);
+            let mut scene = segment.scene.select(&part.gaussians);
             // All chunks have one environment map, and the same sockets and colliders, in the first file.
             scene.environment = scene.environment.filter(|_| files.is_empty());
             if !files.is_empty() {
                 scene.sockets.clear();
                 scene.colliders = None;
             }
-            save(&path, &scene, &settings)?;
+            save_chunk(&path, &scene, &settings)?;
             let bytes = fs::metadata(&path).map_err(|error| FileError::at(&path, error))?.len();
             let Part { stretches, layer, ref gaussians } = *part;
             let file = ChunkFile { stretches, layer, gaussians: gaussians.len() as u64, bytes };
@@ -132,7 +130,7 @@ impl Split {
             files: files.iter().map(|chunk| chunk.file).collect(),
         };
         let chunks = Some(Arc::new(table.clone()));
-        let scene = GaussianScene { filter: None, chunks, ..select(&segment.scene, &[]) };
+        let scene = GaussianScene { filter: None, chunks, ..segment.scene.select(&[]) };
         save(&index, &scene, &settings)?;
         progress.advance();
         progress.finish();
@@ -155,31 +153,6 @@ fn remove_index(index: &Path) -> Result<(), FileError> {
     }
 }
 
-/// Returns the importance of a Gaussian for pictures; 0 if it is not a number.
-fn importance(gaussian: &Gaussian) -> f32 {
-    let importance = gaussian.importance();
-    if importance.is_nan() { 0.0 } else { importance }
-}
-
-/// Returns the first and the last stretch of time in which each Gaussian may be drawn.
-fn lives(scene: &GaussianScene, gaussians: &[Gaussian], stretches: u32) -> Vec<[u32; 2]> {
-    let support = || {
-        let (interval, cutoff) = (scene.trained_with.time_interval, scene.trained_with.marginal_cutoff);
-        TemporalFilter::support(gaussians.iter().copied(), interval, cutoff, stretches)
-    };
-    let filter = scene.filter.clone().unwrap_or_else(support);
-    let words = intervals(&filter).unwrap_or_else(|| hulls(&filter));
-    let (count, segments) = (u64::from(stretches), u64::from(filter.segments.max(1)));
-    let life = |word: &u32| {
-        let (first, last) = (u64::from(word & 0xffff), u64::from(word >> 16));
-        // Of Gaussians that are never drawn, the last segment is the one at which they would be.
-        let first = first.min(last) * count / segments;
-        let last = ((last + 1) * count).div_ceil(segments).clamp(1, count) - 1;
-        [first.min(last) as u32, last as u32]
-    };
-    words.iter().map(life).collect()
-}
-
 /// Returns a chunk file in a folder that is none of these files: it would be read with them. `None` if there is no such
 /// file, or no such folder.
 pub fn other_chunk(folder: &Path, files: &[PathBuf]) -> Option<PathBuf> {
@@ -188,6 +161,7 @@ pub fn other_chunk(folder: &Path, files: &[PathBuf]) -> Option<PathBuf> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::parts::importance;
     use super::super::unite::unite;
     use super::*;
     use crate::codec::{self, ReadOptions};

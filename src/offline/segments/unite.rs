@@ -1,6 +1,7 @@
 //! The capture of chunks.
 //!
-//! In: all chunks of a capture, in order. Out: the capture, with the Gaussians in the order of the chunks.
+//! In: all chunks of a capture, in order. Out: the capture, with the Gaussians in the order of the chunks; a packed one
+//! is the package that was cut.
 
 use super::error::{SegmentsError, Shared};
 use super::forms::append;
@@ -11,9 +12,9 @@ use crate::scene::{ActiveSets, GaussianScene, TemporalFilter};
 /// Returns the capture of chunks. Begins the task "uniting".
 ///
 /// # Errors
-/// No chunk, a packed chunk, chunks of different captures, by name.
+/// No chunk, packed Gaussians that are no chunks, chunks of different captures, by name.
 pub fn unite(chunks: Vec<Segment>, progress: &mut dyn Progress) -> Result<GaussianScene, SegmentsError> {
-    chunks.iter().try_for_each(Segment::require_unpacked)?;
+    chunks.iter().filter(|chunk| !chunk.has_runs()).try_for_each(Segment::require_unpacked)?;
     progress.begin("uniting", chunks.len());
     let mut chunks = chunks.into_iter();
     let Some(Segment { path: first, scene: mut all }) = chunks.next() else { return Err(SegmentsError::Nothing) };

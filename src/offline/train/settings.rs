@@ -7,7 +7,7 @@ use super::images::Coarse;
 use super::reference::terms::Terms;
 use super::schedule::{Behind, Rates, Step};
 use crate::gaussian::GradientMode;
-use crate::offline::compress::Quality;
+use crate::offline::compress::{PackedOrder, Quality};
 
 /// Settings of training.
 #[derive(Debug, Clone, PartialEq)]
@@ -46,8 +46,8 @@ pub struct FineTuneSettings {
     /// How the result is compressed, and the number of further steps in which the codebooks of color are trained;
     /// `None` leaves the scene in the trained form.
     pub compress: Option<(Quality, usize)>,
-    /// Whether the Gaussians of the compressed result are in layers, the most important ones first. Default: `false`.
-    pub progressive: bool,
+    /// The order of the Gaussians of the compressed result. Default: spatial.
+    pub order: PackedOrder,
     /// Whether these further steps see geometry as the package will hold it, rounded. Default: `false`; it pays with
     /// few bits.
     pub rounding: bool,
@@ -92,7 +92,7 @@ impl Default for FineTuneSettings {
             mode: GradientMode::default(),
             growth: None,
             compress: None,
-            progressive: false,
+            order: PackedOrder::Spatial,
             rounding: false,
             standing: false,
         }

@@ -6,7 +6,7 @@
 use super::temporary_file;
 use super::temporary_file::{Part, folder_of};
 use super::unfinished::Streaming;
-use crate::codec::package::{self, WriteSettings};
+use crate::codec::package::{self, PackageError, WriteSettings};
 use crate::codec::{self, CodecError, CodecErrorKind};
 use crate::scene::{Form, GaussianScene, SceneForm};
 use crate::view::Picture;
@@ -25,13 +25,23 @@ const MAX_LINKS: usize = 40;
 /// A scene that the format cannot hold, a folder that cannot be written to, a full disk, a package that cannot be read
 /// back.
 pub fn save(path: &Path, scene: &GaussianScene, settings: &WriteSettings) -> Result<(), CodecError> {
-    let part = part(path, |writer| codec::write(writer, path, scene, settings), read_back)?;
+    let part = part(path, |writer| codec::write(writer, path, scene, settings), |file| read_back(package::read(file)))?;
+    temporary_file::replace(part.into_iter().collect())
+}
+
+/// Writes a chunk file, as [`save`] does. Codebooks of colors are left to the index of its capture.
+///
+/// # Errors
+/// As [`save`].
+pub(crate) fn save_chunk(path: &Path, scene: &GaussianScene, settings: &WriteSettings) -> Result<(), CodecError> {
+    let read = |file| read_back(package::read_chunk(file, scene.form.codebooks()));
+    let part = part(path, |writer| package::write_chunk(writer, scene, settings), read)?;
     temporary_file::replace(part.into_iter().collect())
 }
 
 /// Checks that a package that was just written can be read.
-fn read_back(file: File) -> Result<(), CodecErrorKind> {
-    match package::read(file) {
+fn read_back(read: Result<GaussianScene, PackageError>) -> Result<(), CodecErrorKind> {
+    match read {
         Ok(_) => Ok(()),
         Err(error) => {
             let message = format!("the package cannot be read back ({error}), so that it is not kept");

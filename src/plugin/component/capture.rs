@@ -313,6 +313,7 @@ mod tests {
             ranges: Vec::new(),
             colors: PackedColors::Whole(Harmonics { coefficients: 1, values: vec![0.0; 3], ..Harmonics::default() }),
             layers: Vec::new(),
+            runs: None,
         };
         let empty = RuntimeScene::sliced(Vec::new(), Harmonics::default());
         let scene = RuntimeScene { form: Form::Packed(packed), ..empty };

@@ -9,6 +9,8 @@ use crate::renderer::device::memory::Allocator;
 use crate::scene::packed::{BLOCK, BLOCK_RANGES, COLOR_WORDS, RECORD_WORDS, SHARED_RANGES};
 use crate::scene::{ActiveSets, CodedColors, Environment, Form, RuntimeScene, TemporalFilter};
 use std::ops::Range;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Largest number of bytes that are converted and written at once. It limits the memory of converted records on the host.
 const BYTES_AT_ONCE: u64 = 1 << 20;
@@ -26,6 +28,8 @@ pub(super) struct Filling {
     count: usize,
     /// Number of records that have been written.
     done: usize,
+    /// Tells other captures that all records have been written, if they share the buffer.
+    is_filled: Option<Arc<AtomicBool>>,
 }
 
 /// The content of a buffer.
@@ -117,9 +121,20 @@ fn place_in_entry(index: usize, words: usize) -> usize {
 }
 
 /// Creates the buffer of all codebooks.
-pub(super) fn codebooks(allocator: Allocator<'_>, colors: &CodedColors) -> Filling {
-    let count = colors.codebooks.len() / colors.words_per_entry();
-    Filling::new(allocator, "gs4d codebooks", Content::Codebooks, 0..0, entry_words(colors) * 4, count)
+pub(super) fn codebooks(allocator: Allocator<'_>, colors: &CodedColors) -> wgpu::Buffer {
+    storage(allocator, "gs4d codebooks", colors.codebooks.total().max(1) * entry_words(colors) * 4)
+}
+
+/// Fills the buffer of all codebooks; then `is_filled` is true.
+pub(super) fn codebooks_in(buffer: wgpu::Buffer, colors: &CodedColors, is_filled: Arc<AtomicBool>) -> Filling {
+    let (size, count) = (entry_words(colors) * 4, colors.codebooks.total());
+    Filling { buffer, content: Content::Codebooks, own: 0..0, size, count, done: 0, is_filled: Some(is_filled) }
+}
+
+/// Creates a buffer of this many bytes that shaders read. A binding of no bytes is not allowed.
+fn storage(allocator: Allocator<'_>, label: &str, bytes: usize) -> wgpu::Buffer {
+    // A binding of no bytes is not allowed.
+    allocator.buffer(label, bytes as u64, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC)
 }
 
 /// Creates the buffer of the active sets of the Gaussians in `own`, which starts at a multiple of 32.
@@ -151,10 +166,8 @@ impl Filling {
         size: usize,
         count: usize,
     ) -> Self {
-        // A binding of no bytes is not allowed.
-        let bytes = (count.max(1) * size) as u64;
-        let buffer = allocator.buffer(label, bytes, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC);
-        Self { buffer, content, own, size, count, done: 0 }
+        let buffer = storage(allocator, label, count.max(1) * size);
+        Self { buffer, content, own, size, count, done: 0, is_filled: None }
     }
 
     /// Returns the bytes of a record.
@@ -178,6 +191,9 @@ impl Filling {
         self.convert(scene, records.clone(), chunk);
         queue.write_buffer(&self.buffer, (records.start * self.size) as u64, chunk);
         self.done = records.end;
+        if let Some(is_filled) = self.is_filled.as_ref().filter(|_| self.done == self.count) {
+            is_filled.store(true, Ordering::Relaxed);
+        }
         chunk.len() as u64
     }
 

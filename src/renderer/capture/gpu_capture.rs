@@ -5,6 +5,7 @@
 //! by one dispatch.
 
 use super::buffers::{self, Filling};
+use super::prefixes::Prefixes;
 use crate::gaussian::ShDirection;
 use crate::gaussian::harmonics::evaluated;
 use crate::renderer::device::GpuError;
@@ -29,6 +30,8 @@ pub struct GpuCapture {
     /// Identifies this upload within the process.
     pub(in crate::renderer) id: u64,
     pub(in crate::renderer) filter: Option<Filter>,
+    /// Of its Gaussians, those that a thinned capture needs.
+    pub(in crate::renderer) prefixes: Prefixes,
     /// Bytes of its buffers, without the filter.
     bytes: u64,
     /// The box around its Gaussians at all times, in capture space, if it is known. It changes no picture.
@@ -61,6 +64,8 @@ pub(in crate::renderer) struct Filter {
     interval: [f32; 2],
     /// Number of active Gaussians, part by part and segment by segment.
     counts: Vec<u32>,
+    /// The same of each prefix.
+    prefix_counts: Vec<Vec<u32>>,
     /// Bytes of its buffers.
     bytes: u64,
     /// Largest number of active Gaussians of all parts in any segment.
@@ -68,14 +73,19 @@ pub(in crate::renderer) struct Filter {
 }
 
 impl Filter {
-    fn new(filter: &TemporalFilter, interval: [f32; 2], parts: &[Part], bytes: u64) -> Self {
-        let mut counts = Vec::with_capacity(parts.len() * filter.segments as usize);
-        let mut first = 0;
-        for part in parts {
-            let own = first..first + part.count as usize;
-            counts.extend(filter.active_counts(own.clone()));
-            first = own.end;
-        }
+    fn new(filter: &TemporalFilter, interval: [f32; 2], parts: &[Part], prefixes: &Prefixes, bytes: u64) -> Self {
+        let counts_up_to = |end: usize| {
+            let mut counts = Vec::with_capacity(parts.len() * filter.segments as usize);
+            let mut first = 0;
+            for part in parts {
+                let after = first + part.count as usize;
+                counts.extend(filter.active_counts(first.min(end)..after.min(end)));
+                first = after;
+            }
+            counts
+        };
+        let counts = counts_up_to(usize::MAX);
+        let prefix_counts = prefixes.iter().map(|prefix| counts_up_to(prefix.end)).collect();
         let mode = match filter.sets {
             ActiveSets::Bits(_) => layout::FILTER_BITS,
             ActiveSets::Intervals(_) => layout::FILTER_INTERVALS,
@@ -84,7 +94,7 @@ impl Filter {
         let of_all_parts = |segment: usize| counts.iter().skip(segment).step_by(segments.max(1)).sum::<u32>();
         let most = (0..segments).map(of_all_parts).max().unwrap_or_default();
         let is_window = filter.kind == FilterKind::Window;
-        Self { mode, is_window, segments: filter.segments, interval, counts, bytes, most }
+        Self { mode, is_window, segments: filter.segments, interval, counts, prefix_counts, bytes, most }
     }
 
     /// Returns the segment of a time, in the capture's unit.
@@ -92,9 +102,11 @@ impl Filter {
         segment_of(time, self.interval, self.segments)
     }
 
-    /// Returns the number of active Gaussians of a part in a segment.
-    pub(crate) fn count(&self, part: usize, segment: u32) -> u32 {
-        self.counts.get(part * self.segments as usize + segment as usize).copied().unwrap_or_default()
+    /// Returns the number of active Gaussians of a part in a segment; of those in the prefix with an index, if there is
+    /// one.
+    pub(crate) fn count(&self, part: usize, segment: u32, prefix: Option<usize>) -> u32 {
+        let counts = prefix.map_or(&self.counts, |prefix| &self.prefix_counts[prefix]);
+        counts.get(part * self.segments as usize + segment as usize).copied().unwrap_or_default()
     }
 }
 
@@ -123,13 +135,14 @@ impl GpuCapture {
             allocator.bind_group("gs4d capture", layout, &resources)
         };
         let (mut parts, mut fillings) = (Vec::new(), Vec::new());
-        let codebooks = form.coded_colors().map(|colors| buffers::codebooks(allocator, colors));
+        let codebooks = form.coded_colors().map(|colors| renderer.codebooks.claim(allocator, colors));
         for first in (0..scene.len()).step_by(per_part) {
             let own = first..(first + per_part).min(scene.len());
             let geometry = buffers::geometry(allocator, form, own.clone());
             let color = buffers::color(allocator, form, own.clone(), stride);
             let buffer = |filling: &Filling| filling.buffer.clone();
-            let colors = [&color].into_iter().chain(&codebooks).map(buffer).collect();
+            let shared = codebooks.iter().map(|(buffer, _)| buffer.clone());
+            let colors = [buffer(&color)].into_iter().chain(shared).collect();
             let both: [Vec<wgpu::Buffer>; 2] = [geometry.iter().map(buffer).collect(), colors];
             parts.push(Part {
                 count: own.len() as u32,
@@ -140,7 +153,7 @@ impl GpuCapture {
             });
             fillings.extend(geometry.into_iter().chain([color]));
         }
-        fillings.extend(codebooks);
+        fillings.extend(codebooks.and_then(|(_, filling)| filling));
         let environment = scene.environment.as_ref().map(|map| {
             let texels = buffers::environment(allocator, map);
             let buffer = texels.buffer.clone();
@@ -149,8 +162,9 @@ impl GpuCapture {
         });
         let bytes = fillings.iter().map(|filling| filling.buffer.size()).sum();
         let (settings, id) = (settings(scene, stride), NEXT_ID.fetch_add(1, Ordering::Relaxed));
+        let (prefixes, len) = (Prefixes::of(scene), scene.len());
         let mut capture =
-            Self { parts, environment, storage, id, filter: None, bytes, bounds: None, settings, len: scene.len() };
+            Self { parts, environment, storage, id, filter: None, prefixes, bytes, bounds: None, settings, len };
         if let Some(filter) = &scene.filter {
             fillings.extend(capture.allocate_filter(allocator, renderer, filter, scene.trained_with.time_interval));
         }
@@ -175,7 +189,7 @@ impl GpuCapture {
             first = end;
         }
         let bytes = fillings.iter().map(|filling| filling.buffer.size()).sum();
-        self.filter = Some(Filter::new(filter, interval, &self.parts, bytes));
+        self.filter = Some(Filter::new(filter, interval, &self.parts, &self.prefixes, bytes));
         // Active lists of the previous filter become invalid.
         self.id = NEXT_ID.fetch_add(1, Ordering::Relaxed);
         fillings
@@ -285,7 +299,7 @@ fn settings(scene: &RuntimeScene, stride: usize) -> InstanceUniforms {
         degree,
         degree_t: if degree == 3 { degree_t } else { 0 },
         stride: colors.map_or(stride, buffers::entry_words) as u32,
-        stages: colors.map_or(0, |colors| colors.entries.len() as u32),
+        stages: colors.map_or(0, |colors| colors.codebooks.entries.len() as u32),
         first_entries: colors.map(first_entries).unwrap_or_default(),
         displaced: u32::from(trained_with.sh_direction == ShDirection::Displaced),
         time_span: trained_with.period_of_colors(),
@@ -296,5 +310,5 @@ fn settings(scene: &RuntimeScene, stride: usize) -> InstanceUniforms {
 
 /// Returns the index of the first entry of each codebook among all entries.
 fn first_entries(colors: &CodedColors) -> [u32; MAX_STAGES] {
-    std::array::from_fn(|stage| colors.entries.iter().take(stage).sum())
+    std::array::from_fn(|stage| colors.codebooks.entries.iter().take(stage).sum())
 }

@@ -3,7 +3,7 @@
 //! In: captures, cameras and surfaces. Out: [`Instance`]s and [`ViewParameters`] for
 //! [`ViewRenderer::prepare`](crate::renderer::view::ViewRenderer::prepare).
 
-use crate::renderer::active::ActiveList;
+use crate::renderer::active::{ActiveList, listed_count};
 use crate::renderer::capture::GpuCapture;
 use crate::renderer::frame::Blending;
 use crate::renderer::shaders::ColorPrecision;
@@ -25,6 +25,18 @@ pub struct Instance<'a> {
 }
 
 impl Instance<'_> {
+    /// Returns the number of Gaussians of a part that its list has; all without a list.
+    pub(in crate::renderer) fn listed(&self, part: usize) -> u32 {
+        listed_count(self.capture, part, self.active, None)
+    }
+
+    /// Returns the number of Gaussians of a part that are projected: the first ones of those that are
+    /// [listed](Self::listed), as many as the thinning needs.
+    pub(in crate::renderer) fn drawn(&self, part: usize) -> u32 {
+        let prefix = self.capture.prefixes.needed(self.appearance.thinning.least);
+        listed_count(self.capture, part, self.active, prefix)
+    }
+
     /// Returns whether one dispatch can draw this instance and the next: both draw all Gaussians of the same capture, which has one part.
     pub(in crate::renderer) fn joins(&self, next: &Self) -> bool {
         let draws_all = self.active.is_none() && next.active.is_none();

@@ -2,7 +2,6 @@
 //!
 //! In: a prepared view and its instances. Out: dispatches over the parts of instances and over tiles, and timestamps between passes.
 
-use crate::renderer::active::drawn_count;
 use crate::renderer::frame::Instance;
 use crate::renderer::layout::{INSTANCE_STRIDE, INSTANCES_AT_ONCE};
 use crate::renderer::passes::MotionPass;
@@ -58,7 +57,7 @@ impl Recording<'_> {
                     pass.set_bind_group(0, group, &[index * INSTANCE_STRIDE]);
                     pass.set_bind_group(1, &part.geometry, &[]);
                     pass.set_bind_group(3, &part.color, &[]);
-                    let gaussians = drawn_count(instance.capture, at, instance.active);
+                    let gaussians = batch.iter().map(|instance| instance.drawn(at)).max().unwrap_or_default();
                     pass.dispatch_workgroups(groups(instance.capture.storage, gaussians), 1, count);
                     // Instances that are drawn together have one part.
                     index += count;
@@ -84,7 +83,7 @@ impl Recording<'_> {
                 let offset = index * INSTANCE_STRIDE;
                 pass.set_bind_group(0, group, &[offset, offset]);
                 pass.set_bind_group(1, &part.geometry, &[]);
-                let count = drawn_count(instance.capture, at, instance.active);
+                let count = instance.drawn(at);
                 // 256 Gaussians per workgroup.
                 pass.dispatch_workgroups(count.div_ceil(256).min(most), 1, 1);
                 index += 1;

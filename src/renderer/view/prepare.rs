@@ -5,7 +5,7 @@
 use super::motion::MotionResources;
 use super::resources::{Resources, texture_bytes};
 use super::view_renderer::ViewRenderer;
-use crate::renderer::active::{drawn_count, most_at_once, most_drawn};
+use crate::renderer::active::{most_at_once, most_drawn};
 use crate::renderer::device::GpuError;
 use crate::renderer::device::memory::{binding_limit, require_texture};
 use crate::renderer::frame::Preparation;
@@ -83,8 +83,7 @@ impl ViewRenderer {
         let environment_buffer = environment.map_or(&self.no_environment, |map| &map.buffer).clone();
         self.fit(&frame, sizes, opaque_view, environment_buffer);
         self.design.begin();
-        let active =
-            |i: &Instance<'_>| (0..i.capture.parts.len()).map(|at| drawn_count(i.capture, at, i.active)).sum::<u32>();
+        let active = |i: &Instance<'_>| (0..i.capture.parts.len()).map(|at| i.drawn(at)).sum::<u32>();
         self.slots = instances.iter().map(active).sum();
         self.prepare_motion(&frame, parameters)?;
         self.count_bytes();

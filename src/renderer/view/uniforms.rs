@@ -4,7 +4,6 @@
 //! instances and of its motions.
 
 use super::view_renderer::ViewRenderer;
-use crate::renderer::active::drawn_count;
 use crate::renderer::frame::Preparation;
 use crate::renderer::frame::ViewParameters;
 use crate::renderer::layout::{self, FrameUniforms, INSTANCE_STRIDE, InstanceUniforms};
@@ -25,12 +24,12 @@ impl ViewRenderer {
             let mut own = InstanceUniforms { listed, middle: capture.middle(seen.camera_z), ..seen };
             for part in 0..capture.parts.len() {
                 own.first_slot = slot;
-                own.count = drawn_count(capture, part, instance.active);
+                own.count = instance.drawn(part);
                 (own.per_thread, own.binning) = design.of_part(index, own.count);
                 uniforms.extend_from_slice(bytemuck::bytes_of(&own));
                 uniforms.resize(uniforms.len().next_multiple_of(INSTANCE_STRIDE as usize), 0);
                 slot += own.count;
-                own.first_listed += own.count;
+                own.first_listed += instance.listed(part);
                 index += 1;
             }
         }

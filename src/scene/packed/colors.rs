@@ -5,12 +5,14 @@
 //! reads; and the coefficients decoded from them. `offline::compress::codebook` trains the codebooks.
 
 use super::additional_bits::additional_bits;
+use super::codebooks::ColorCodebooks;
 use super::lanes::{self, BASE_MAX, COLOR_WORDS, MAX_ENTRIES, MAX_STAGES};
 use crate::gaussian::harmonics::BRIGHTEST;
 use crate::gaussian::{Harmonics, harmonics};
 use glam::Vec3;
 use half::f16;
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Usual size of the range of DC coefficients. A larger range has more bits. Trained captures have 5 to 10.
 const BASES: f32 = 16.0;
@@ -24,13 +26,8 @@ pub struct CodedColors {
     pub degree_t: u32,
     /// One record for each Gaussian: the DC coefficient (10 bits for each channel), then four codes of 16 bits.
     pub records: Vec<[u32; COLOR_WORDS]>,
-    /// Number of entries of each codebook.
-    pub entries: Vec<u32>,
-    /// All codebooks: `words_per_entry` words for each entry, four signed bytes to a word, RGB innermost, DC
-    /// coefficient 0.
-    pub codebooks: Vec<u32>,
-    /// Value of a byte of 127: `words_per_entry` four-vectors for each codebook.
-    pub scales: Vec<[f32; 4]>,
+    /// The codebooks, with [`words_per_entry`](Self::words_per_entry) words for each entry. Scenes may share them.
+    pub codebooks: Arc<ColorCodebooks>,
 }
 
 impl CodedColors {
@@ -46,9 +43,7 @@ impl CodedColors {
 
     /// Returns the bytes in memory.
     pub fn size(&self) -> usize {
-        size_of_val(self.records.as_slice())
-            + size_of_val(self.codebooks.as_slice())
-            + size_of_val(self.scales.as_slice())
+        size_of_val(self.records.as_slice()) + self.codebooks.size()
     }
 
     /// Creates colors of these degrees, without codebooks, from the DC coefficient of each Gaussian, RGB, quantized to
@@ -76,14 +71,15 @@ impl CodedColors {
     /// # Panics
     /// If there are four codebooks already, or if `scales` is empty or longer than a row.
     pub fn push_codebook(&mut self, entries: &[i8], scales: &[f32], codes: &[u16]) {
-        let (stage, words) = (self.entries.len(), self.words_per_entry());
-        let rows = entries.chunks_exact(scales.len());
-        self.entries.push(rows.len() as u32);
+        let words = self.words_per_entry();
+        let (rows, codebooks) = (entries.chunks_exact(scales.len()), Arc::make_mut(&mut self.codebooks));
+        let stage = codebooks.entries.len();
+        codebooks.entries.push(rows.len() as u32);
         for row in rows {
             let fours = padded(row, words);
-            self.codebooks.extend(fours.iter().map(|&four| u32::from_le_bytes(four.map(i8::cast_unsigned))));
+            codebooks.words.extend(fours.iter().map(|&four| u32::from_le_bytes(four.map(i8::cast_unsigned))));
         }
-        self.scales.extend(padded(scales, words));
+        codebooks.scales.extend(padded(scales, words));
         for (record, &code) in self.records.iter_mut().zip(codes) {
             lanes::pack_code(record, stage, code);
         }
@@ -103,14 +99,7 @@ impl CodedColors {
     /// If an index is out of range.
     pub(super) fn select(&self, keep: &[u32]) -> Self {
         let records = keep.iter().map(|&index| self.records[index as usize]).collect();
-        Self {
-            degree: self.degree,
-            degree_t: self.degree_t,
-            records,
-            entries: self.entries.clone(),
-            codebooks: self.codebooks.clone(),
-            scales: self.scales.clone(),
-        }
+        Self { records, codebooks: self.codebooks.clone(), ..*self }
     }
 
     /// Returns the sum of a Gaussian's entries in all codebooks, RGB innermost, padded to whole words. The codebooks
@@ -122,10 +111,10 @@ impl CodedColors {
         let words = self.words_per_entry();
         let mut rest = vec![0.0; words * 4];
         let mut first = 0;
-        for (stage, &entries) in self.entries.iter().enumerate() {
+        for (stage, &entries) in self.codebooks.entries.iter().enumerate() {
             let entry = (first + self.code(index, stage) as usize) * words;
-            let scales = &self.scales[stage * words..][..words];
-            for ((four, &word), scale) in rest.chunks_exact_mut(4).zip(&self.codebooks[entry..]).zip(scales) {
+            let scales = &self.codebooks.scales[stage * words..][..words];
+            for ((four, &word), scale) in rest.chunks_exact_mut(4).zip(&self.codebooks.words[entry..]).zip(scales) {
                 for (value, add) in four.iter_mut().zip(Self::values(word, scale)) {
                     *value += add.to_f32();
                 }
@@ -147,12 +136,12 @@ impl CodedColors {
 
     /// Returns the words of each entry of all codebooks, with their scales.
     pub fn all_entries(&self) -> impl Iterator<Item = (&[u32], &[[f32; 4]])> {
-        let words = self.words_per_entry();
-        let stages = self.entries.iter().enumerate();
+        let (words, codebooks) = (self.words_per_entry(), &*self.codebooks);
+        let stages = codebooks.entries.iter().enumerate();
         let scales = stages.flat_map(move |(stage, &count)| {
-            std::iter::repeat_n(&self.scales[stage * words..][..words], count as usize)
+            std::iter::repeat_n(&codebooks.scales[stage * words..][..words], count as usize)
         });
-        self.codebooks.chunks_exact(words).zip(scales)
+        codebooks.words.chunks_exact(words).zip(scales)
     }
 
     /// Returns the DC coefficient of a Gaussian; `low` and `size` are its range.
@@ -193,22 +182,22 @@ impl CodedColors {
         if self.degree > 3 || self.degree_t > 2 {
             return Err("a degree of color that does not exist");
         }
-        let words = self.words_per_entry();
-        let total: u64 = self.entries.iter().map(|&entries| u64::from(entries)).sum();
+        let (words, ColorCodebooks { entries, words: all, scales }) = (self.words_per_entry(), &*self.codebooks);
+        let total: u64 = entries.iter().map(|&entries| u64::from(entries)).sum();
         if self.records.len() != count {
             return Err("its colors are those of another number of Gaussians");
         }
-        if self.entries.len() > MAX_STAGES || self.entries.iter().any(|&entries| entries > MAX_ENTRIES) {
+        if entries.len() > MAX_STAGES || entries.iter().any(|&entries| entries > MAX_ENTRIES) {
             return Err("more codebooks, or more entries in one, than a record has codes for");
         }
-        if self.codebooks.len() as u64 != total * words as u64 || self.scales.len() != words * self.entries.len() {
+        if all.len() as u64 != total * words as u64 || scales.len() != words * entries.len() {
             return Err("the codebooks do not have the size that their entries need");
         }
-        if !self.scales.as_flattened().iter().all(|value| value.is_finite()) {
+        if !scales.as_flattened().iter().all(|value| value.is_finite()) {
             return Err("a scale of a codebook that is not finite");
         }
         let fits = |&record: &[u32; COLOR_WORDS]| {
-            self.entries.iter().enumerate().all(|(stage, &entries)| lanes::unpack_code(record, stage) < entries)
+            entries.iter().enumerate().all(|(stage, &entries)| lanes::unpack_code(record, stage) < entries)
         };
         if self.records.par_iter().all(fits) { Ok(()) } else { Err("a code beyond its codebook") }
     }
@@ -224,25 +213,26 @@ impl CodedColors {
             return;
         }
         if kept == 1 {
-            (self.entries, self.codebooks, self.scales) = (Vec::new(), Vec::new(), Vec::new());
+            self.codebooks = Arc::default();
             self.records.iter_mut().for_each(|record| record[1..].fill(0));
             return;
         }
         // The unused bytes of the last word of an entry are 0.
         let used = 4 - (after * 4 - kept * 3);
-        let mut codebooks = Vec::with_capacity(self.codebooks.len() / before * after);
-        for entry in self.codebooks.chunks_exact(before) {
-            codebooks.extend_from_slice(&entry[..after - 1]);
-            codebooks.push(entry[after - 1] & u32::MAX >> (8 * (4 - used)));
+        let codebooks = Arc::make_mut(&mut self.codebooks);
+        let mut entries = Vec::with_capacity(codebooks.words.len() / before * after);
+        for entry in codebooks.words.chunks_exact(before) {
+            entries.extend_from_slice(&entry[..after - 1]);
+            entries.push(entry[after - 1] & u32::MAX >> (8 * (4 - used)));
         }
-        let mut scales = Vec::with_capacity(self.scales.len() / before * after);
-        for row in self.scales.chunks_exact(before) {
+        let mut scales = Vec::with_capacity(codebooks.scales.len() / before * after);
+        for row in codebooks.scales.chunks_exact(before) {
             scales.extend_from_slice(&row[..after]);
             if let Some(last) = scales.last_mut() {
                 last[used..].fill(0.0);
             }
         }
-        (self.codebooks, self.scales) = (codebooks, scales);
+        (codebooks.words, codebooks.scales) = (entries, scales);
     }
 }
 

@@ -158,7 +158,7 @@ impl PackedScene {
             ranges.extend(block_ranges);
             records.extend(own);
         }
-        Self { records, ranges, colors, layers: Vec::new() }
+        Self { records, ranges, colors, layers: Vec::new(), runs: None }
     }
 }
 

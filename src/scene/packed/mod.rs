@@ -17,11 +17,13 @@
 //! | `rounding.rs` | the change of a Gaussian by packing |
 //! | `coarseness.rs` | whether means are precise enough for the size of their Gaussians |
 //! | `shape.rs` | a covariance as scales and a rotation, and back |
-//! | `colors.rs` | colors by codebook, and back |
+//! | `colors.rs`, `codebooks.rs` | colors by codebook, and back |
+//! | `runs.rs` | which blocks are in which chunk file |
 
 mod additional_bits;
 pub(crate) mod anchor;
 mod coarseness;
+mod codebooks;
 mod colors;
 mod decode;
 pub(crate) mod encode;
@@ -30,15 +32,18 @@ mod morton;
 pub(crate) mod order;
 pub(crate) mod pack;
 mod rounding;
+pub(crate) mod runs;
 mod scene;
 mod select;
 mod shape;
 mod strays;
 
+pub use codebooks::ColorCodebooks;
 pub use colors::CodedColors;
 pub use encode::Bits;
 pub use lanes::{BLOCK, BLOCK_RANGES, COLOR_WORDS, MAX_ENTRIES, MAX_STAGES, RECORD_WORDS, SHARED_RANGES};
 pub use pack::{PackError, Packing};
 pub use rounding::Rounding;
+pub use runs::{RunPart, Runs};
 pub(crate) use scene::are_layers;
 pub use scene::{PackedColors, PackedScene};

@@ -3,11 +3,13 @@
 //! In: Gaussians. Out: a permutation by the Morton code (Z-order) of their means, so that blocks have small boxes and
 //! columns compress; a progressive order has layers, the most important Gaussians first, each in Morton order. If some
 //! Gaussians are so far away that the others would lose precision, the order also has fillers ([`is_filler`]), so that
-//! distant Gaussians are in blocks of their own. Fillers also end a layer, which has whole blocks.
+//! distant Gaussians are in blocks of their own. Fillers also end a layer, which has whole blocks. The order of chunk
+//! files has the parts of [`Runs`] in each layer, which end as layers do.
 
 use super::lanes::BLOCK;
 use super::morton::by_code;
 pub use super::morton::is_filler;
+use super::runs::{Part, RunPart, Runs};
 use super::strays::{append, most, set_apart};
 use crate::gaussian::Gaussian;
 use rayon::prelude::*;
@@ -22,15 +24,44 @@ pub struct Order {
     pub indices: Vec<u32>,
     /// The places at which the layers but the last end, ascending: multiples of [`BLOCK`].
     pub layers: Vec<usize>,
+    /// Which places are in which chunk file, in the order of chunk files.
+    pub runs: Option<Runs>,
 }
 
 impl Order {
+    /// Returns the order of chunk files: of `stretches` stretches of time, these parts, which have each Gaussian once.
+    pub(crate) fn of_parts(gaussians: &[Gaussian], stretches: u32, mut parts: Vec<Part>) -> Self {
+        parts.sort_by_key(|part| (part.layer, part.stretches));
+        let build = |arranged: fn(&[Gaussian], Vec<u32>) -> Vec<u32>| {
+            let (mut indices, mut ends) = (Vec::with_capacity(gaussians.len()), Vec::with_capacity(parts.len()));
+            for Part { stretches, layer, gaussians: members } in &parts {
+                let own: Vec<Gaussian> = members.iter().map(|&index| gaussians[index as usize]).collect();
+                let order = arranged(&own, by_code(&own, (0..own.len() as u32).collect()));
+                let order: Vec<u32> = order.into_iter().map(|place| members[place as usize]).collect();
+                append(&mut indices, &order);
+                let end = indices.len().next_multiple_of(BLOCK);
+                ends.push(RunPart { stretches: *stretches, layer: *layer, end });
+            }
+            if let Some(last) = ends.last_mut() {
+                last.end = indices.len();
+            }
+            (indices, ends)
+        };
+        let (mut indices, mut ends) = build(set_apart);
+        // The last block of each part has fillers in any case.
+        if indices.len() > most(gaussians.len()) + parts.len() * BLOCK {
+            (indices, ends) = build(|_, order| order);
+        }
+        let runs = Runs { stretches, parts: ends };
+        Self { indices, layers: runs.layers(), runs: Some(runs) }
+    }
+
     /// Returns the Morton order, or the progressive one.
     pub fn of(gaussians: &[Gaussian], progressive: bool) -> Self {
         if progressive {
             progressive_order(gaussians)
         } else {
-            Self { indices: morton_order(gaussians), layers: Vec::new() }
+            Self { indices: morton_order(gaussians), layers: Vec::new(), runs: None }
         }
     }
 }
@@ -44,7 +75,7 @@ fn progressive_order(gaussians: &[Gaussian]) -> Order {
     sorted.sort_unstable_by(|a, b| key(b).total_cmp(&key(a)).then(a.cmp(b)));
     let blocks = sorted.len().div_ceil(BLOCK);
     let ends = LAYERS.map(|divisor| blocks.div_ceil(divisor) * BLOCK);
-    let (mut order, mut start) = (Order { indices: Vec::new(), layers: Vec::new() }, 0);
+    let (mut order, mut start) = (Order { indices: Vec::new(), layers: Vec::new(), runs: None }, 0);
     for end in ends.into_iter().chain([sorted.len()]) {
         let layer = sorted.get(start..end.min(sorted.len())).unwrap_or_default();
         if layer.is_empty() {
@@ -57,7 +88,7 @@ fn progressive_order(gaussians: &[Gaussian]) -> Order {
         start += layer.len();
     }
     if order.indices.len() > most(gaussians.len()) {
-        return Order { indices: morton_order(gaussians), layers: Vec::new() };
+        return Order { indices: morton_order(gaussians), layers: Vec::new(), runs: None };
     }
     order
 }
@@ -103,6 +134,31 @@ mod tests {
                 assert!(least >= most, "{least} before the end of a layer, {most} after it");
             }
         }
+    }
+
+    #[test]
+    fn parts_have_whole_blocks_and_each_gaussian_once() {
+        let mut random = Random::new(4);
+        let mut gaussians: Vec<Gaussian> = (0..4_000).map(|_| gaussian(&mut random)).collect();
+        for stray in gaussians.iter_mut().step_by(500) {
+            stray.mean = stray.mean.map(|axis| axis * 1e5);
+        }
+        let part = |first: u32, layer: u32, gaussians: Vec<u32>| Part { stretches: [first, first], layer, gaussians };
+        let every = |offset: u32| (offset..4_000).step_by(3).collect::<Vec<u32>>();
+        let parts = vec![part(1, 1, every(0)), part(1, 0, every(1)), part(0, 0, every(2))];
+        let order = Order::of_parts(&gaussians, 2, parts.clone());
+        let runs = order.runs.expect("runs");
+        assert_eq!(runs.check(order.indices.len()), Ok(()), "whole blocks");
+        assert_eq!(order.layers, [runs.parts[1].end], "the layer after the most important one");
+        let expected = [&parts[2], &parts[1], &parts[0]];
+        for ((own, range), Part { stretches, layer, gaussians }) in runs.ranges().zip(expected) {
+            assert_eq!((own.stretches, own.layer), (*stretches, *layer), "by layer, then by stretches");
+            let places = range.filter(|&place| !is_filler(&order.indices, place));
+            let mut found: Vec<u32> = places.map(|place| order.indices[place]).collect();
+            found.sort_unstable();
+            assert_eq!(found, *gaussians, "the Gaussians of the part, besides fillers");
+        }
+        assert!(Order::of_parts(&[], 2, Vec::new()).indices.is_empty(), "no Gaussian");
     }
 
     #[test]

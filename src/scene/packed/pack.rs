@@ -78,14 +78,30 @@ impl RuntimeScene {
     ///
     /// # Errors
     /// A scene that is packed already, a packing that is invalid, values that the packed form cannot hold.
-    pub fn pack(mut self, packing: &Packing) -> Result<Self, PackError> {
+    pub fn pack(self, packing: &Packing) -> Result<Self, PackError> {
+        self.pack_in(packing, |scene| {
+            let sliced = scene.form.as_sliced().ok_or(PackError::AlreadyPacked)?;
+            Ok(Order::of(&sliced.gaussians, packing.progressive))
+        })
+    }
+
+    /// As [`pack`](Self::pack), in the order that `order` returns for the Gaussians as they will be encoded.
+    ///
+    /// # Errors
+    /// As [`pack`](Self::pack), and those of `order`.
+    pub(crate) fn pack_in<E: From<PackError>>(
+        mut self,
+        packing: &Packing,
+        order: impl FnOnce(&Self) -> Result<Order, E>,
+    ) -> Result<Self, E> {
         packing.check()?;
         let TrainedWith { time_interval, marginal_cutoff, .. } = self.trained_with;
-        let Form::Sliced(sliced) = &mut self.form else { return Err(PackError::AlreadyPacked) };
+        let Form::Sliced(sliced) = &mut self.form else { return Err(PackError::AlreadyPacked.into()) };
         move_near(&mut sliced.gaussians, time_interval, marginal_cutoff);
-        let order = Order::of(&sliced.gaussians, packing.progressive);
+        let order = order(&self)?;
+        let Form::Sliced(sliced) = &self.form else { return Err(PackError::AlreadyPacked.into()) };
         let colors = PackedColors::Whole(rounded(sliced.harmonics.select(&order.indices), packing.color_step));
-        pack_ordered(self, &packing.bits, &order, colors, [0.0; 2])
+        Ok(pack_ordered(self, &packing.bits, &order, colors, [0.0; 2])?)
     }
 }
 
@@ -103,9 +119,9 @@ pub(crate) fn pack_ordered(
 ) -> Result<RuntimeScene, PackError> {
     let Form::Sliced(sliced) = &scene.form else { return Err(PackError::AlreadyPacked) };
     let TrainedWith { time_interval, marginal_cutoff, .. } = scene.trained_with;
-    let Order { indices: order, layers } = order;
+    let Order { indices: order, layers, runs } = order;
     let encoded = encode_ordered(&sliced.gaussians, order, bits, colors, base, scene.trained_with.time_span());
-    let packed = PackedScene { layers: layers.clone(), ..encoded };
+    let packed = PackedScene { layers: layers.clone(), runs: runs.clone(), ..encoded };
     packed.check().map_err(PackError::Range)?;
     check_each(&packed, order)?;
     let filter = scene.filter.map(|filter| match filter.kind {

@@ -5,6 +5,7 @@
 
 use super::colors::CodedColors;
 use super::lanes::{self, BLOCK, BLOCK_RANGES, RECORD_WORDS, SHARED_RANGES};
+use super::runs::Runs;
 use crate::gaussian::Harmonics;
 use rayon::prelude::*;
 
@@ -20,8 +21,10 @@ pub struct PackedScene {
     pub colors: PackedColors,
     /// Numbers of Gaussians up to the ends of the layers but the last, ascending multiples of [`BLOCK`]: the Gaussians
     /// of a layer are less important than those before it, so that the first layers show the scene coarsely. At most
-    /// 15. Empty: one layer.
+    /// 15. Empty: one layer. Of a scene with [runs](Self::runs) this holds within the stretches of each chunk file.
     pub layers: Vec<usize>,
+    /// Which of them are in which chunk file, if their order is that of chunk files. Then `layers` are those of the runs.
+    pub runs: Option<Runs>,
 }
 
 /// The color of packed Gaussians.
@@ -69,6 +72,12 @@ impl PackedScene {
         }
         if !are_layers(&self.layers, self.len()) {
             return Err("layers that are not ascending numbers of whole blocks, or too many");
+        }
+        if let Some(runs) = &self.runs {
+            runs.check(self.len())?;
+            if runs.layers() != self.layers {
+                return Err("layers that are not those of the runs");
+            }
         }
         if !self.ranges.as_flattened().iter().all(|value| value.is_finite()) {
             return Err("a range that is not finite");

@@ -1,12 +1,13 @@
 //! Some of the Gaussians of a packed scene, without a change of their values.
 //!
 //! In: a packed scene, the indices of the Gaussians that it keeps. Out: their records, with the ranges of their blocks and the
-//! ends of their layers.
+//! ends of their layers and runs.
 //! A record is decoded by the ranges of its block: Gaussians of two blocks never share one, and a block that loses some
 //! ends with fillers.
 
 use super::lanes::{BLOCK, BLOCK_RANGES, SHARED_RANGES, hidden};
 use super::order::is_filler;
+use super::runs::{RunPart, Runs};
 use super::scene::{PackedColors, PackedScene};
 
 impl PackedScene {
@@ -36,8 +37,24 @@ impl PackedScene {
             PackedColors::Whole(harmonics) => PackedColors::Whole(harmonics.select(&order)),
             PackedColors::Coded(colors) => PackedColors::Coded(colors.select(&order)),
         };
-        let layers = self.layers_of(&order);
-        (Self { records, ranges, colors, layers }, order)
+        let (layers, runs) = (self.layers_of(&order), self.runs_of(&order));
+        (Self { records, ranges, colors, layers, runs }, order)
+    }
+
+    /// Returns the runs of an order of some of the Gaussians, whose blocks are those of the scene; `None` if none are
+    /// left.
+    fn runs_of(&self, order: &[u32]) -> Option<Runs> {
+        let Runs { stretches, parts } = self.runs.as_ref()?;
+        let end = |part: &RunPart| order.partition_point(|&index| (index as usize) < part.end);
+        let whole = |end: usize| end.next_multiple_of(BLOCK).min(order.len());
+        let mut own = Vec::with_capacity(parts.len());
+        for part in parts {
+            let end = whole(end(part));
+            if end > own.last().map_or(0, |before: &RunPart| before.end) {
+                own.push(RunPart { end, ..*part });
+            }
+        }
+        (!own.is_empty()).then_some(Runs { stretches: *stretches, parts: own })
     }
 
     /// Returns the ends of the layers of an order of some of the Gaussians, whose blocks are those of the scene.
@@ -116,6 +133,24 @@ mod tests {
         assert_eq!(layers(&[300, 800]), [256], "none in the first layer");
         assert_eq!(layers(&[3, 5]), [0; 0], "none behind the first layer");
         assert_eq!(layers(&[900]), [0; 0], "the last layer alone");
+    }
+
+    #[test]
+    fn runs_keep_the_gaussians_that_are_left() {
+        let mut all = packed(1500);
+        let part = |first, layer, end| RunPart { stretches: [first, 3], layer, end };
+        all.layers = vec![768];
+        all.runs = Some(Runs { stretches: 4, parts: vec![part(0, 0, 256), part(1, 0, 768), part(0, 1, 1500)] });
+        assert_eq!(all.check(), Ok(()), "runs and layers fit together");
+        let ends = |keep: &[u32]| {
+            let some = all.select(keep).0;
+            assert_eq!(some.check(), Ok(()), "what is left fits together");
+            some.runs.map(|runs| runs.parts.iter().map(|part| (part.stretches[0], part.layer, part.end)).collect())
+        };
+        assert_eq!(ends(&(0..1500).collect::<Vec<_>>()), Some(vec![(0, 0, 256), (1, 0, 768), (0, 1, 1500)]), "all");
+        assert_eq!(ends(&(256..768).collect::<Vec<_>>()), Some(vec![(1, 0, 512)]), "a chunk file");
+        assert_eq!(ends(&[3, 4, 800]), Some(vec![(0, 0, 256), (0, 1, 257)]), "a part without Gaussians is left out");
+        assert_eq!(ends(&[]), None, "none");
     }
 
     #[test]

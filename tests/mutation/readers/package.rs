@@ -14,11 +14,11 @@ use bevy_gs4d::codec::package::{
 };
 use bevy_gs4d::gaussian::{Model, Parameters};
 use bevy_gs4d::internal::codec::{FLOAT_PLANES, PACKAGE};
-use bevy_gs4d::offline::compress::{CompressSettings, compress};
+use bevy_gs4d::offline::compress::{CompressSettings, PackedOrder, compress};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{
-    ChunkFile, ChunkTable, ColliderMesh, ColliderStretch, Colliders, Environment, FilterKind, GaussianScene, Level,
-    RuntimeScene, SceneForm, TemporalFilter, Trained,
+    ChunkFile, ChunkTable, ColliderMesh, ColliderStretch, Colliders, Environment, FilterKind, Form, GaussianScene,
+    Level, RunPart, Runs, RuntimeScene, SceneForm, TemporalFilter, Trained,
 };
 use std::io::Cursor;
 use std::sync::Arc;
@@ -114,7 +114,7 @@ fn scenes() -> Vec<GaussianScene> {
         let scene = packed_scene::scene(40, degree, degree_t);
         compress(scene, &packed_scene::settings(codebooks)).expect("a synthetic scene can be compressed").0
     };
-    let settings = CompressSettings { progressive: true, ..packed_scene::settings(&[3]) };
+    let settings = CompressSettings { order: PackedOrder::Progressive, ..packed_scene::settings(&[3]) };
     let layered = compress(packed_scene::scene(700, 1, 0), &settings).expect("a synthetic scene can be compressed").0;
     let mut detailed = packed_scene::scene(40, 0, 0);
     detailed.levels = [(64.0, 9), (8.0, 3)]
@@ -136,9 +136,21 @@ fn scenes() -> Vec<GaussianScene> {
         pack(1, 0, &[3]),
         pack(0, 0, &[]),
         layered,
+        cut(),
         synthesize(&SynthSettings { count: 0, ..SynthSettings::default() }),
         index(),
     ]
+}
+
+/// Returns packed Gaussians in the order of chunk files.
+fn cut() -> GaussianScene {
+    let packed = compress(packed_scene::scene(700, 1, 0), &packed_scene::settings(&[3]));
+    let mut scene = packed.expect("a synthetic scene can be compressed").0;
+    let SceneForm::Ready(Form::Packed(packed)) = &mut scene.form else { panic!("the scene is packed") };
+    let part = |first, layer, end| RunPart { stretches: [first, 3], layer, end };
+    packed.layers = vec![512];
+    packed.runs = Some(Runs { stretches: 4, parts: vec![part(0, 0, 256), part(2, 0, 512), part(0, 1, packed.len())] });
+    scene
 }
 
 /// Returns the index of a capture in chunk files.
@@ -351,7 +363,9 @@ fn change_number(header: &mut Header, random: &mut Random) {
     const COEFFICIENTS: [usize; 14] = [0, 1, 2, 4, 5, 9, 10, 15, 16, 17, 32, 33, 48, 49];
     let any = random.one_in(5).then(|| numbers::whole(random));
     let small = |random: &mut Random| any.map_or(random.below(5) as u32, |any| any as u32);
-    match random.below(12) {
+    match random.below(14) {
+        13 => header.codebooks_in_index ^= true,
+        12 => change_runs(&mut header.runs, random),
         11 => change_chunks(&mut header.chunks, random),
         10 => header.layers = (0..random.below(4)).map(|_| *random.pick(&[0, 256, 512, 100, usize::MAX])).collect(),
         9 => change_colliders(&mut header.colliders, random),
@@ -376,6 +390,22 @@ fn change_number(header: &mut Header, random: &mut Random) {
             header.filter = Some(filter).filter(|_| !random.one_in(3));
         }
         _ => header.form = form(random),
+    }
+}
+
+/// Changes one number of the order of chunk files, or takes it away.
+fn change_runs(runs: &mut Option<Runs>, random: &mut Random) {
+    let Some(Runs { stretches, parts }) = runs else { return };
+    let at = random.below(parts.len());
+    let small = random.below(5) as u32;
+    let any = if random.one_in(3) { numbers::whole(random) as u32 } else { small };
+    match (random.below(6), parts.get_mut(at)) {
+        (0, _) => *stretches = any,
+        (1, Some(part)) => part.stretches[random.below(2)] = any,
+        (2, Some(part)) => part.layer = any,
+        (3, Some(part)) => part.end = *random.pick(&[0, 255, 256, 512, 700, usize::MAX]),
+        (4, Some(_)) => drop(parts.remove(at)),
+        _ => *runs = None,
     }
 }
 

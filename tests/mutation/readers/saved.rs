@@ -14,7 +14,7 @@ use bevy_gs4d::codec::package::WriteSettings;
 use bevy_gs4d::codec::{self, ReadOptions};
 use bevy_gs4d::offline;
 use bevy_gs4d::offline::bake::{BakeSettings, bake};
-use bevy_gs4d::offline::compress::Quality;
+use bevy_gs4d::offline::compress::{PackedOrder, Quality};
 use bevy_gs4d::offline::dataset::SplitOptions;
 use bevy_gs4d::offline::engine::Engine;
 use bevy_gs4d::offline::filter::KeyFrames;
@@ -68,7 +68,7 @@ impl Saved {
             key_frames: KeyFrames::Count(4),
             fine_tune: None,
             quality: Quality::VisuallyLossless,
-            progressive: false,
+            order: PackedOrder::Spatial,
             level: Some(1),
             trust_images: false,
             keep_work: true,

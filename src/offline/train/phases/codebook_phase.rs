@@ -36,8 +36,8 @@ pub(super) fn compress(
     session.enter(session.settings.steps, progress)?;
     session.trainer.forget_moments();
     let scene = session.trainer.scene()?.into_runtime()?;
-    let progressive = session.settings.progressive;
-    let settings = CompressSettings { progressive, ..CompressSettings::suiting(quality, scene.len()) };
+    let order = session.settings.order.clone();
+    let settings = CompressSettings { order, ..CompressSettings::suiting(quality, scene.len()) };
     // Codebooks hold all coefficients but the first.
     let coded = scene.form.as_sliced().is_some_and(|sliced| sliced.harmonics.evaluated() > 1);
     let steps = if settings.codebooks.is_empty() || !coded { 0 } else { steps };
