@@ -2,18 +2,20 @@
 //!
 //! In: a synthetic capture that `gs4d split` has cut, from an asset source whose reads the tests let through, fail and
 //! count. Out: proof that a capture is ready with its coarse picture and then becomes whole, that its settings decide
-//! what is drawn while files are missing, that budgets are kept, that files are loaded again after failures and reloads,
-//! that the entities of files follow that of the capture, and that a whole stream has the picture of the joined capture.
-//! Only the last needs a GPU.
+//! what is drawn while files are missing, that budgets are kept, that files are loaded again after failures and
+//! reloads, that faults are reported, that the entities of files follow that of the capture, and that a whole stream
+//! has the picture of the joined capture, also after the loss of a device. Only the last two need a GPU.
 
-use crate::support::event_log::{debug, record, take_events};
+use crate::support::event_log::{Observed, debug, record, take_events};
 use crate::support::fixtures::synthetic_eye;
 use crate::support::gated_files::GatedFiles;
 use crate::support::offscreen_app::{self, picture, run_frames, spawn_camera};
 use crate::support::playback_app::{self, change, get, pass};
 use crate::support::waiting::wait_until;
 use bevy::camera::visibility::RenderLayers;
+use bevy::ecs::system::RunSystemOnce;
 use bevy::prelude::*;
+use bevy::render::renderer::RenderDevice;
 use bevy::time::TimeUpdateStrategy;
 use bevy_gs4d::codec::stream::StreamSchedule;
 use bevy_gs4d::codec::{self, ReadOptions};
@@ -51,23 +53,40 @@ struct Split {
 }
 
 static SPLIT: LazyLock<Split> = LazyLock::new(|| {
+    let split = split("--count 12000 --sh-degree 0", None, "--chunk 0.5 --layers 25,25,50");
+    assert_eq!((split.table.stretches, split.table.layers()), (8, 3), "stretches of half a second, in three layers");
+    split
+});
+
+/// A packed capture in chunk files, whose codebooks are in the index.
+static PACKED: LazyLock<Split> = LazyLock::new(|| {
+    let order = "--chunk 1 --layers 25,75 --codebooks 64,32 --verify 0";
+    let split = split("--count 30000 --sh-degree 1", Some(order), "");
+    assert_eq!((split.table.stretches, split.table.layers()), (4, 2), "stretches of a second, in two layers");
+    split
+});
+
+/// Makes a synthetic capture with these options, compresses it with others, if any, and cuts it with further ones.
+fn split(synthetic: &str, packed: Option<&str>, cut: &str) -> Split {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let [whole, chunks, joined] = ["whole.gs4d", "chunks", "joined.gs4d"].map(|name| folder.path().join(name));
+    let [mut whole, chunks, joined] = ["whole.gs4d", "chunks", "joined.gs4d"].map(|name| folder.path().join(name));
     let words = |words: &str| words.split_whitespace().map(OsString::from).collect::<Vec<_>>();
     let file = |path: &Path| vec![path.as_os_str().to_owned()];
-    let synthetic = words("--count 12000 --duration 4 --sh-degree 0 --level 1");
-    run(&[words("synth"), file(&whole), synthetic].concat());
-    let layers = words("--chunk 0.5 --layers 25,25,50 --level 1");
-    run(&[words("split"), file(&whole), words("-o"), file(&chunks), layers].concat());
+    run(&[words("synth"), file(&whole), words(synthetic), words("--duration 4 --level 1")].concat());
+    if let Some(order) = packed {
+        let out = folder.path().join("packed.gs4d");
+        run(&[words("compress"), file(&whole), file(&out), words(order), words("--level 1")].concat());
+        whole = out;
+    }
+    run(&[words("split"), file(&whole), words("-o"), file(&chunks), words(cut), words("--level 1")].concat());
     run(&[words("join"), file(&chunks), words("-o"), file(&joined), words("--level 1")].concat());
     let read = |path: &Path| fs::read(path).expect("the command has written it");
     let entries = fs::read_dir(&chunks).expect("the command has made it").map(|entry| entry.expect("readable"));
     let files = entries.map(|entry| (entry.file_name().to_string_lossy().into_owned(), read(&entry.path()))).collect();
     let index = codec::load(&chunks.join(ChunkTable::INDEX), &ReadOptions::default()).expect("a package");
     let table = index.chunks.expect("an index has a table");
-    assert_eq!((table.stretches, table.layers()), (8, 3), "stretches of half a second, in three layers");
     Split { files, joined: read(&joined), table }
-});
+}
 
 /// Runs the `gs4d` command.
 fn run(arguments: &[OsString]) {
@@ -111,7 +130,12 @@ struct Stage {
 
 impl Stage {
     fn new() -> Self {
-        let gate = GatedFiles::new(&SPLIT.files);
+        Self::of(&SPLIT.files)
+    }
+
+    /// Returns a stage with other files.
+    fn of(files: &BTreeMap<String, Vec<u8>>) -> Self {
+        let gate = GatedFiles::new(files);
         gate.let_through([ChunkTable::INDEX.to_owned()]);
         let mut app = App::new();
         gate.add_to(&mut app);
@@ -386,6 +410,102 @@ fn a_stream_stays_within_its_budget_and_is_coarse_after_every_jump() {
 }
 
 #[test]
+fn a_budget_for_one_moment_is_enough_to_jump() {
+    let [before, after] = [coarse(0.0), coarse(LATE)];
+    let most = gpu_bytes(&before).max(gpu_bytes(&after));
+    assert!(gpu_bytes(&(&before | &after)) > most, "there is no room for both");
+    let mut stage = Stage::new();
+    stage.gate.open();
+    stage.app.insert_resource(StreamBudget { gpu_bytes: most, ..default() });
+    let settings = CaptureStreamSettings { on_underrun: OnUnderrun::Stall, preload: vec![0.0] };
+    let entity = stage.spawn((Playback::default(), settings));
+    until(&mut stage.app, "the first picture", |app| stream(app, entity).is_coarse);
+    seek(&mut stage.app, entity, LATE);
+    until(&mut stage.app, "the picture after the jump", |app| {
+        let state = stream(app, entity);
+        state.is_coarse && state.seconds == Some(LATE)
+    });
+}
+
+/// Updates a few times, without time passing.
+fn rest(app: &mut App) {
+    for _ in 0..5 {
+        pass(app, 0.0);
+    }
+}
+
+#[test]
+fn a_capture_that_does_not_fit_the_budget_says_so_once() {
+    let mut stage = Stage::new();
+    let app = &mut stage.app;
+    stage.gate.open();
+    let needed = gpu_bytes(&coarse(0.0));
+    app.insert_resource(StreamBudget { gpu_bytes: needed - 1, ..default() });
+    let capture = app.world().resource::<AssetServer>().load(INDEX);
+    let entity = app.world_mut().spawn(GaussianCapture3d(capture)).id();
+    until(app, "the index", |app| stream(app, entity).needed > 0);
+    rest(app);
+    let error = CaptureFailure::OverBudget { path: INDEX.to_owned(), needed, limit: needed - 1 };
+    assert_eq!(events(app, "CaptureFailed"), [debug(&CaptureFailed { entity, error })], "one message");
+    assert_eq!(get::<CaptureState>(app, entity), CaptureState::Loading, "there is no picture");
+    app.insert_resource(StreamBudget::default());
+    until(app, "a picture", |app| get::<CaptureState>(app, entity) == CaptureState::Ready);
+    assert_eq!(events(app, "CaptureFailed"), [""; 0], "no further message");
+}
+
+#[test]
+fn an_index_without_a_folder_says_so_once() {
+    let mut stage = Stage::new();
+    let loaded = stage.spawn(Playback::default());
+    until(&mut stage.app, "the index", |app| table(app, loaded).is_some());
+    let app = &mut stage.app;
+    let index = captures(app).get(&get::<GaussianCapture3d>(app, loaded).0).expect("the index is loaded").clone();
+    let capture = app.world_mut().resource_mut::<Assets<GaussianCapture>>().add(index);
+    let entity = app.world_mut().spawn(GaussianCapture3d(capture)).id();
+    rest(app);
+    let failed = events(app, "CaptureFailed");
+    let says = [format!("entity: {entity:?}"), "NotDrawable".to_owned(), "AssetServer::load".to_owned()];
+    let is_said = |text: &String| says.iter().all(|words| text.contains(words));
+    assert!(matches!(&failed[..], [text] if is_said(text)), "one message: {failed:?}");
+}
+
+#[test]
+fn a_capture_whose_files_cannot_be_read_says_so_once() {
+    let mut stage = Stage::new();
+    stage.gate.open();
+    stage.gate.fail(names(coarse(0.0)));
+    let entity = stage.spawn(Playback::default());
+    // After five tries, which take about four seconds.
+    until(&mut stage.app, "a message", |app| {
+        app.world().resource::<Observed>().0.iter().any(|event| event.starts_with("CaptureFailed"))
+    });
+    rest(&mut stage.app);
+    let failed = events(&mut stage.app, "CaptureFailed");
+    let says = [format!("entity: {entity:?}"), "Unreadable".to_owned(), INDEX.to_owned(), "chunk-0".to_owned()];
+    let is_said = |text: &String| says.iter().all(|words| text.contains(words));
+    assert!(matches!(&failed[..], [text] if is_said(text)), "one message: {failed:?}");
+    let state = stream(&stage.app, entity);
+    assert!(state.retries > 0 && !state.is_coarse, "files are asked for again: {state:?}");
+}
+
+#[test]
+fn a_file_with_more_gaussians_than_its_index_says_is_not_drawn() {
+    let bad = *coarse(0.0).first().expect("every moment has Gaussians");
+    let mut files = SPLIT.files.clone();
+    files.insert(name(bad), SPLIT.joined.clone());
+    let mut stage = Stage::of(&files);
+    stage.gate.open();
+    let entity = stage.spawn(Playback::default());
+    until(&mut stage.app, "a refused file", |app| stream(app, entity).failures > 0);
+    let others = coarse(0.0).len() - 1;
+    until(&mut stage.app, "the other files", |app| stream(app, entity).resident >= others);
+    rest(&mut stage.app);
+    let state = stream(&stage.app, entity);
+    assert!(!state.is_coarse && state.seconds.is_none(), "the file does not count as there: {state:?}");
+    assert_eq!(count_parts(&stage.app), 0, "nothing is drawn");
+}
+
+#[test]
 fn a_file_that_lands_after_its_capture_was_removed_is_ignored() {
     let mut stage = Stage::new();
     let entity = stage.spawn(Playback::default());
@@ -433,6 +553,18 @@ fn two_entities_of_one_capture_share_its_files() {
     assert_eq!(parts(&stage.app, entities[1]), drawn(needed(1.7), 1.7), "the second stays");
     let once: BTreeMap<String, usize> = SPLIT.files.keys().map(|name| (name.clone(), 1)).collect();
     assert_eq!(stage.gate.reads(), once, "each file is read once");
+}
+
+#[test]
+fn each_entity_has_a_message_about_its_first_picture() {
+    let mut stage = Stage::new();
+    stage.whole();
+    said(&mut stage.app);
+    let second = stage.spawn(Playback::paused_at(0.0));
+    until(&mut stage.app, "the picture of the second", |app| stream(app, second).is_whole());
+    rest(&mut stage.app);
+    let buffered = debug(&CaptureBuffered { entity: second, seconds: 0.0 });
+    assert_eq!(said(&mut stage.app), [buffered], "its Gaussians were there before it");
 }
 
 #[test]
@@ -558,6 +690,31 @@ fn parts_take_over_the_settings_of_their_parent() {
 }
 
 #[test]
+fn rays_do_not_hit_parts() {
+    let mut stage = Stage::new();
+    let entity = stage.whole();
+    let app = &mut stage.app;
+    let parts = children(app, entity);
+    let handles: Vec<GaussianCapture3d> = parts.iter().map(|part| get::<GaussianCapture3d>(app, *part)).collect();
+    // Along -z through each Gaussian.
+    let through = |capture: &GaussianCapture| {
+        let means = capture.scene().iter().map(|gaussian| gaussian.mean_at(capture.time_at(0.0)));
+        means.map(|mean| Ray3d::new(mean + Vec3::Z, Dir3::NEG_Z)).collect::<Vec<Ray3d>>()
+    };
+    let loaded = handles.iter().filter_map(|handle| captures(app).get(&handle.0));
+    let rays: Vec<Ray3d> = loaded.flat_map(through).collect();
+    // The same files on entities of the game.
+    let place = |handle: GaussianCapture3d| app.world_mut().spawn((handle, Playback::paused_at(0.0))).id();
+    let others: Vec<Entity> = handles.into_iter().map(place).collect();
+    let are_hit = move |picker: CapturePicker| {
+        let is_hit = |entity: &Entity| rays.iter().any(|ray| picker.cast_on(*entity, *ray).is_some());
+        [&parts, &others].map(|entities| entities.iter().any(is_hit))
+    };
+    let found = app.world_mut().run_system_once(are_hit).expect("the system runs");
+    assert_eq!(found, [false, true], "no part is hit, and entities of the game are");
+}
+
+#[test]
 fn a_stream_follows_a_clock() {
     let mut stage = Stage::new();
     stage.gate.open();
@@ -611,11 +768,22 @@ fn pictures(app: &mut App, entity: Entity, times: [f32; 5], is_there: impl Fn(&A
 
 #[test]
 fn a_whole_stream_has_the_picture_of_the_joined_capture() {
+    check_pictures(&SPLIT);
+}
+
+#[test]
+fn a_whole_stream_of_packed_files_has_the_picture_of_the_package() {
+    assert!(PACKED.table.files.len() >= 4, "several runs: {:?}", PACKED.table);
+    check_pictures(&PACKED);
+}
+
+/// Checks that a whole stream has the pictures of the joined capture.
+fn check_pictures(split: &Split) {
     let Some(mut app) = offscreen_app::app(UVec2::new(96, 72)) else { return };
     let folder = tempfile::tempdir().expect("a temporary folder");
     let joined = folder.path().join("joined.gs4d");
-    fs::write(&joined, &SPLIT.joined).expect("the folder can be written to");
-    for (name, bytes) in &SPLIT.files {
+    fs::write(&joined, &split.joined).expect("the folder can be written to");
+    for (name, bytes) in &split.files {
         fs::write(folder.path().join(name), bytes).expect("the folder can be written to");
     }
     spawn_camera(&mut app, Msaa::Off, synthetic_eye());
@@ -642,4 +810,31 @@ fn a_whole_stream_has_the_picture_of_the_joined_capture() {
         assert_eq!(count, 0, "{count} pixels differ at {seconds} s, by at most {most} / 255");
     }
     assert_ne!(whole[0], whole[1], "the capture moves");
+}
+
+#[test]
+fn a_stream_is_loaded_again_after_its_device_was_lost() {
+    let Some(mut app) = offscreen_app::app(UVec2::new(96, 72)) else { return };
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for (name, bytes) in &SPLIT.files {
+        fs::write(folder.path().join(name), bytes).expect("the folder can be written to");
+    }
+    spawn_camera(&mut app, Msaa::Off, synthetic_eye());
+    let index = app.world().resource::<AssetServer>().load(folder.path().join(ChunkTable::INDEX));
+    let entity = app.world_mut().spawn((GaussianCapture3d(index), Playback::paused_at(1.3))).id();
+    let files = |app: &App| -> BTreeSet<AssetId<GaussianCapture>> {
+        children(app, entity).into_iter().map(|part| get::<GaussianCapture3d>(app, part).0.id()).collect()
+    };
+    let whole = picture(&mut app, 0.0);
+    let before = files(&app);
+    assert!(stream(&app, entity).is_whole() && !before.is_empty(), "the picture is whole");
+    // Bevy's recovery inserts a device, too.
+    let device = app.world().resource::<RenderDevice>().clone();
+    app.insert_resource(device);
+    run_frames(&mut app, 1);
+    assert_eq!(count_parts(&app), 0, "nothing is drawn of what was on the old device");
+    let is_there = |app: &App| stream(app, entity).is_whole();
+    wait_until(&mut app, "all files again", is_there, |app| run_frames(app, 1));
+    assert!(before.is_disjoint(&files(&app)), "they are other assets");
+    assert!(picture(&mut app, 0.0) == whole, "the same picture");
 }

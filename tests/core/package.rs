@@ -865,6 +865,8 @@ fn bad_tables_of_chunk_files_are_neither_read_nor_written() {
         ("stretches: 3600", "stretches: 0", "stretches"),
         ("stretches: 3600", "stretches: 3599", "stretches"),
         ("gaussian_bytes: 88", "gaussian_bytes: 0", "no bytes"),
+        ("gaussian_bytes: 88", "gaussian_bytes: 16385", "more than 16384 bytes"),
+        ("(0, 3599, 1, 12345, ", "(0, 3599, 1, 0, ", "without Gaussians"),
         ("(0, 3599, 1, ", "(0, 3599, 16, ", "a layer above 15"),
         ("(0, 3599, 1, ", "(0, 3599, -1, ", "cannot be understood"),
     ] {
@@ -876,7 +878,11 @@ fn bad_tables_of_chunk_files_are_neither_read_nor_written() {
     let mut nested = detailed();
     let level = nested.levels[1].scene.as_ref().clone();
     nested.levels[1].scene = Arc::new(RuntimeScene { chunks: index(1).chunks, ..level });
-    for (bad, expected) in [(bad, "stretches"), (nested, "in chunk files itself")] {
+    let full = GaussianScene { chunks: index(1).chunks, ..scene(&SMALL, 35) };
+    let leveled = GaussianScene { levels: detailed().levels, ..index(1) };
+    let itself = "with Gaussians or levels of detail itself";
+    let all = [(bad, "stretches"), (nested, "in chunk files itself"), (full, itself), (leveled, itself)];
+    for (bad, expected) in all {
         let error = package::write(Vec::new(), &bad, &WriteSettings::default()).expect_err("must be refused");
         assert!(error.to_string().contains(expected), "{error}");
     }

@@ -27,6 +27,8 @@ struct Gate {
     let_through: BTreeSet<String>,
     /// The files whose next read fails.
     failing: BTreeSet<String>,
+    /// The files whose reads all fail.
+    broken: BTreeSet<String>,
     /// Number of reads of each file, those that wait or have failed included.
     reads: BTreeMap<String, usize>,
     /// The reads that wait.
@@ -63,6 +65,11 @@ impl GatedFiles {
         self.change(|gate| gate.failing.extend(names));
     }
 
+    /// Makes every read of each of these files fail, once it is let through.
+    pub fn fail(&self, names: impl IntoIterator<Item = String>) {
+        self.change(|gate| gate.broken.extend(names));
+    }
+
     /// Returns the number of reads of each file that has been asked for.
     pub fn reads(&self) -> BTreeMap<String, usize> {
         self.gate().reads.clone()
@@ -92,7 +99,10 @@ impl AssetReader for GatedFiles {
             Poll::Pending
         });
         let_through.await;
-        let fails = self.gate().failing.remove(&name);
+        let fails = {
+            let mut gate = self.gate();
+            gate.failing.remove(&name) || gate.broken.contains(&name)
+        };
         if fails {
             return Err(AssetReaderError::NotFound(path.to_owned()));
         }

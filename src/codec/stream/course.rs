@@ -204,7 +204,7 @@ mod tests {
     const AXIS: Axis = Axis { duration: 4.0, stretches: 8 };
 
     fn head(seconds: f64, velocity: f64, range: [f64; 2], turn: Turn) -> Playhead {
-        Playhead { seconds, velocity, range, turn }
+        Playhead { seconds, velocity, range, turn, delay: 0.0 }
     }
 
     /// Returns the seconds until each of the eight stretches.

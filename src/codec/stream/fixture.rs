@@ -14,7 +14,7 @@ pub(super) fn table(stretches: u32, files: &[([u32; 2], u32, u64)]) -> ChunkTabl
 
 /// Returns a player at a time, with a velocity, in a range of any end.
 pub(super) fn head(seconds: f64, velocity: f64, turn: Turn) -> Playhead {
-    Playhead { seconds, velocity, range: [0.0, f64::INFINITY], turn }
+    Playhead { seconds, velocity, range: [0.0, f64::INFINITY], turn, delay: 0.0 }
 }
 
 /// Returns any player of a capture of `duration` seconds.
@@ -35,5 +35,7 @@ pub(super) fn random_head(random: &mut Random, duration: f32) -> Playhead {
         _ => 1.0,
     };
     let turn = [Turn::Stop, Turn::Loop, Turn::Return][random.below(3)];
-    Playhead { seconds: now, velocity, range, turn }
+    // One that stands comes after those that play.
+    let delay = if velocity == 0.0 { 1e-3 } else { 0.0 };
+    Playhead { seconds: now, velocity, range, turn, delay }
 }

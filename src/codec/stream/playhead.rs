@@ -19,6 +19,9 @@ pub struct Playhead {
     pub range: [f64; 2],
     /// What the player does at the end of the range.
     pub turn: Turn,
+    /// Seconds that all it needs may come later; NaN and negative numbers count as 0. A picture that stays, or a time
+    /// to which a player may jump, has a small delay: in scarce memory it makes room for what is played.
+    pub delay: f64,
 }
 
 /// What a player does at the end of its range.

@@ -27,6 +27,8 @@ struct Host {
     limits: StreamLimits,
     now: f64,
     requested: BTreeSet<usize>,
+    /// The time of the last request of each file.
+    since: BTreeMap<usize, f64>,
     resident: BTreeSet<usize>,
     /// Files that are being fetched, those that have been given up included.
     jobs: Vec<usize>,
@@ -46,7 +48,7 @@ fn random_table(random: &mut Random) -> ChunkTable {
         ChunkFile {
             stretches: [first as u32, (first + length - 1) as u32],
             layer: random.below(layers) as u32,
-            gaussians: random.below(50) as u64,
+            gaussians: 1 + random.below(50) as u64,
             bytes: random.below(1000) as u64,
         }
     });
@@ -66,6 +68,7 @@ impl Host {
             limits: StreamLimits::default(),
             now: 0.0,
             requested: BTreeSet::new(),
+            since: BTreeMap::new(),
             resident: BTreeSet::new(),
             jobs: Vec::new(),
             failed: BTreeMap::new(),
@@ -101,7 +104,8 @@ impl Host {
     fn change(&mut self) {
         let Self { random, heads, limits, duration, .. } = self;
         let step = f64::from(random.in_range(0.0, 0.3));
-        self.now += step;
+        // Now and then the host stands still, until all requests are overdue.
+        self.now += if step < 0.01 { 40.0 } else { step };
         for head in &mut *heads {
             head.seconds += head.velocity * step;
         }
@@ -139,6 +143,10 @@ impl Host {
                 continue;
             }
             assert!(self.requested.remove(file), "file {file} is neither there nor on the way: {at}");
+            if self.is_overdue(*file) {
+                self.fail(*file);
+                continue;
+            }
             let is_too_large = self.bytes(*file)[0] > self.limits.gpu_bytes;
             assert!(is_too_large || !self.urgency(&demand, *file).is_wanted, "request {file} is of use: {at}");
         }
@@ -152,6 +160,7 @@ impl Host {
                 assert!(self.now >= since + delay, "file {file} has to wait: {at}");
             }
             self.jobs.push(*file);
+            self.since.insert(*file, self.now);
         }
         let fetched: Vec<Urgency> = plan.fetch.iter().map(|file| self.urgency(&demand, *file)).collect();
         assert!(fetched.is_sorted(), "the most urgent files are fetched first: {at}");
@@ -159,6 +168,7 @@ impl Host {
             let least = fetched.iter().map(Urgency::least_given_up).fold(f64::INFINITY, f64::min);
             assert!(given_up.iter().all(|urgency| urgency.seconds() >= least), "less urgent files make room: {at}");
         }
+        assert!(!self.requested.iter().any(|file| self.is_overdue(*file)), "no request goes on for good: {at}");
         self.compare(&at);
         let [gpu, host] = self.sums();
         assert!(gpu <= self.limits.gpu_bytes || self.resident.is_empty(), "{gpu} bytes on the GPU: {at}");
@@ -201,11 +211,21 @@ impl Host {
         } else {
             self.schedule.failed(file, self.now);
             if was_requested {
-                self.failures += 1;
-                let in_a_row = self.failed.get(&file).map_or(0, |(in_a_row, _)| *in_a_row);
-                self.failed.insert(file, (in_a_row + 1, self.now));
+                self.fail(file);
             }
         }
+    }
+
+    /// Counts a failure of a file.
+    fn fail(&mut self, file: usize) {
+        self.failures += 1;
+        let in_a_row = self.failed.get(&file).map_or(0, |(in_a_row, _)| *in_a_row);
+        self.failed.insert(file, (in_a_row + 1, self.now));
+    }
+
+    /// Returns whether the last request of a file has reached its deadline.
+    fn is_overdue(&self, file: usize) -> bool {
+        self.now >= self.since[&file] + 30.0 + self.table.files[file].bytes as f64 / 32_768.0
     }
 
     /// Lets some files arrive or fail, in any order.
@@ -257,7 +277,7 @@ impl Host {
             let urgency = self.urgency(&demand, file);
             let is_there = self.resident.contains(&file);
             assert!(is_there || !urgency.is_wanted, "file {file} is wanted in {} s", urgency.seconds());
-            let latest = self.limits.ahead.max(0.0) + longest;
+            let latest = self.limits.ahead.max(0.0) + 1e-3 + longest;
             assert!(!urgency.is_wanted || urgency.seconds() <= latest, "no urgency is greater than {latest} s");
         }
     }

@@ -29,7 +29,7 @@ impl Retries {
     /// Notes that the request of a file has failed.
     pub(super) fn fail(&mut self, file: usize, now: f64) {
         self.failures = self.failures.saturating_add(1);
-        let before = self.failed.get(&file).map_or(0, |failure| failure.in_a_row);
+        let before = self.in_a_row(file);
         let delay = (FIRST_DELAY * f64::from(before).exp2()).min(LONGEST_DELAY);
         self.failed.insert(file, Failure { in_a_row: before.saturating_add(1), retry_at: now + delay });
     }
@@ -42,6 +42,11 @@ impl Retries {
     /// Returns whether a file has to wait before it is asked for again.
     pub(super) fn waits(&self, file: usize, now: f64) -> bool {
         self.failed.get(&file).is_some_and(|failure| now < failure.retry_at)
+    }
+
+    /// Returns the number of failures of a file since it last arrived.
+    pub(super) fn in_a_row(&self, file: usize) -> u32 {
+        self.failed.get(&file).map_or(0, |failure| failure.in_a_row)
     }
 
     /// Returns the number of requests that have failed.
@@ -64,6 +69,7 @@ mod tests {
             assert!(!retries.waits(3, now + delay), "the file is asked for {delay} s after failure {number}");
         }
         assert!(!retries.waits(4, 600.0), "another file does not wait");
+        assert_eq!([retries.in_a_row(3), retries.in_a_row(4)], [7, 0], "failures in a row");
         retries.arrive(3);
         retries.fail(3, 1000.0);
         assert!(!retries.waits(3, 1000.25), "the delay of a file that has arrived is short again");

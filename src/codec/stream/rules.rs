@@ -167,6 +167,19 @@ fn layer_0_of_now_takes_the_place_of_all_that_is_drawn_later() {
 }
 
 #[test]
+fn the_present_takes_the_place_of_a_picture_that_stays() {
+    let files = [([0, 0], 0, 10), ([0, 0], 0, 10), ([3, 3], 0, 10), ([3, 3], 0, 10)];
+    let mut schedule = schedule(4, &files);
+    let limits = limits(20, 4);
+    let near = StreamLimits { ahead: 0.0, ..limits };
+    let first = settle(&mut schedule, &[head(0.5, 1.0, Turn::Stop)], &near)[0].clone();
+    assert_eq!(first, [0, 1], "there is room for the picture of one moment");
+    let held = Playhead { range: [0.5; 2], delay: 1e-3, ..head(0.5, 0.0, Turn::Stop) };
+    let jumped = settle(&mut schedule, &[head(3.5, 0.0, Turn::Stop), held], &limits);
+    assert_eq!(jumped, [vec![2, 3], vec![1, 0]], "the player does not wait for good");
+}
+
+#[test]
 fn the_first_file_without_room_holds_up_the_others() {
     let files = [([0, 0], 0, 60), ([1, 1], 0, 50), ([2, 2], 0, 10)];
     let mut schedule = schedule(3, &files);
@@ -280,6 +293,24 @@ fn a_file_that_fails_waits_and_does_not_hold_up_others() {
 }
 
 #[test]
+fn a_request_that_does_not_end_counts_as_failed() {
+    let mut schedule = schedule(6, &SINGLE);
+    let heads = [head(0.5, 1.0, Turn::Stop)];
+    let limits = limits(60, 1);
+    assert_eq!(schedule.plan(1.0, &heads, &limits).fetch, [0], "first try");
+    assert_eq!(schedule.plan(30.9, &heads, &limits), StreamPlan::default(), "it has 30 s");
+    let plan = schedule.plan(31.5, &heads, &limits);
+    assert_eq!(plan, StreamPlan { fetch: vec![1], give_up: vec![0] }, "another file takes its place");
+    assert_eq!((schedule.failures(), schedule.failures_in_a_row(0), schedule.waits(0)), (1, 1, true), "a failure");
+    assert!(!schedule.arrived(0), "a file that lands too late does not count");
+    schedule.arrived(1);
+    assert_eq!(schedule.plan(31.75, &heads, &limits).fetch, [0], "second try after 0.25 s");
+    assert!(!schedule.waits(0) && schedule.arrived(0), "it is in time");
+    assert_eq!(schedule.failures_in_a_row(0), 0, "no failure any more");
+    assert_eq!(schedule.plan(99.0, &heads, &limits).give_up, [0; 0], "a file that is there has no deadline");
+}
+
+#[test]
 fn a_clock_that_goes_back_or_makes_no_sense_stands_still() {
     let mut schedule = schedule(6, &SINGLE);
     let heads = [head(0.5, 1.0, Turn::Stop)];
@@ -346,7 +377,7 @@ fn tables_and_players_without_sense_have_plans() {
             for (number, a) in wild.iter().enumerate() {
                 let b = wild[(number + 1) % wild.len()];
                 for turn in [Turn::Stop, Turn::Loop, Turn::Return] {
-                    let head = Playhead { seconds: *a, velocity: b, range: [b, *a], turn };
+                    let head = Playhead { seconds: *a, velocity: b, range: [b, *a], turn, delay: *a };
                     let limits =
                         StreamLimits { gpu_bytes: u64::MAX, host_bytes: u64::MAX, requests: usize::MAX, ahead: *a };
                     for file in schedule.plan(*a, &[head, head], &limits).fetch {

@@ -5,6 +5,7 @@
 
 use super::course::{Axis, Course};
 use super::coverage::Coverage;
+use super::deadlines::Deadlines;
 use super::giving_up::files_to_give_up;
 use super::intervals::Intervals;
 use super::ledger::{FileState, Ledger};
@@ -42,7 +43,7 @@ pub struct StreamPlan {
 /// let table = ChunkTable { stretches: 4, gaussian_bytes: 80, files };
 /// let mut schedule = StreamSchedule::new(table.into(), 8.0);
 ///
-/// let head = Playhead { seconds: 3.0, velocity: 1.0, range: [0.0, 8.0], turn: Turn::Loop };
+/// let head = Playhead { seconds: 3.0, velocity: 1.0, range: [0.0, 8.0], turn: Turn::Loop, delay: 0.0 };
 /// let limits = StreamLimits { requests: 3, ..StreamLimits::default() };
 /// let plan = schedule.plan(0.0, &[head], &limits);
 /// assert_eq!(plan.fetch, [0, 2, 3], "what is needed now, and then what is needed next");
@@ -57,6 +58,7 @@ pub struct StreamSchedule {
     axis: Axis,
     ledger: Ledger,
     retries: Retries,
+    deadlines: Deadlines,
     /// All files.
     files: Intervals,
     /// The files of layer 0.
@@ -72,6 +74,7 @@ impl StreamSchedule {
         Self {
             axis: Axis::new(duration, table.stretches),
             retries: Retries::default(),
+            deadlines: Deadlines::default(),
             files: Intervals::new(files().map(|(number, file)| (number, file.stretches))),
             coarse: Intervals::new(
                 files().filter(|(_, file)| file.layer == 0).map(|(number, file)| (number, file.stretches)),
@@ -97,11 +100,19 @@ impl StreamSchedule {
     ///
     /// A file is fetched if a player reaches it within [`StreamLimits::ahead`] seconds. If the next file does not find
     /// room, those after it wait, too, except for a file that is larger than all memory on the GPU, which is left out.
-    /// Requests that no player needs any more are given up, so that nothing waits for them after a jump in time.
+    /// Requests that no player needs any more are given up, so that nothing waits for them after a jump in time. Those
+    /// that have taken 30 s, and a second more for each 32 KiB of the file, are given up and count as
+    /// [failed](Self::failed).
     pub fn plan(&mut self, now: f64, heads: &[Playhead], limits: &StreamLimits) -> StreamPlan {
         self.pass_time(now);
         let demand = Demand::new(heads, self.axis, limits.ahead_seconds());
         let mut plan = StreamPlan::default();
+        let requested = self.ledger.requested().iter().copied();
+        let overdue: Vec<usize> = requested.filter(|file| self.is_overdue(*file)).collect();
+        for file in overdue {
+            self.failed(file, self.now);
+            plan.give_up.push(file);
+        }
         let requested = self.ledger.requested().iter().copied();
         let stale: Vec<usize> = requested.filter(|file| !self.is_of_use(*file, &demand, limits)).collect();
         for file in stale {
@@ -137,6 +148,7 @@ impl StreamSchedule {
                 self.give_up(given_up, &mut plan);
             }
             self.ledger.request(file);
+            self.deadlines.begin(file, self.now);
             plan.fetch.push(file);
         }
         plan
@@ -214,6 +226,16 @@ impl StreamSchedule {
         self.retries.failures()
     }
 
+    /// Returns the number of requests of a file that have failed since it last arrived.
+    pub fn failures_in_a_row(&self, file: usize) -> u32 {
+        self.retries.in_a_row(file)
+    }
+
+    /// Returns whether the last request of a file has failed, and it is too early for the next.
+    pub fn waits(&self, file: usize) -> bool {
+        self.retries.waits(file, self.now)
+    }
+
     fn pass_time(&mut self, now: f64) {
         if now.is_finite() {
             self.now = self.now.max(now);
@@ -223,6 +245,12 @@ impl StreamSchedule {
     /// Returns the urgency of a file; `None` if the table does not have the file.
     fn urgency(&self, file: usize, demand: &Demand) -> Option<Urgency> {
         self.table().files.get(file).map(|chunk| demand.urgency(file, chunk))
+    }
+
+    /// Returns whether a file on the way has taken too long.
+    fn is_overdue(&self, file: usize) -> bool {
+        let bytes = self.table().files.get(file).map_or(0, |chunk| chunk.bytes);
+        self.deadlines.is_over(file, bytes, self.now)
     }
 
     /// Returns whether a file on the way is of use: a player reaches it, and it has room.
@@ -240,7 +268,7 @@ impl StreamSchedule {
         }
         let may_be_fetched = |file: &usize| {
             let is_absent = self.state(*file) == FileState::Absent;
-            is_absent && self.table().gpu_bytes(*file) <= limits.gpu_bytes && !self.retries.waits(*file, self.now)
+            is_absent && self.table().gpu_bytes(*file) <= limits.gpu_bytes && !self.waits(*file)
         };
         demand.most_urgent(count, |[from, to]| {
             let files = self.files.along(from, to).filter(may_be_fetched);

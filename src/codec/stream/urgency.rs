@@ -18,9 +18,16 @@ const HYSTERESIS: f64 = 0.5;
 /// What the players of a capture need.
 #[derive(Debug, Clone)]
 pub(super) struct Demand {
-    courses: Vec<Course>,
+    players: Vec<Player>,
     /// How far ahead files are fetched, seconds of playing.
     ahead: f64,
+}
+
+/// Where a player goes, and how many seconds later than it gets there it may have what it needs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Player {
+    course: Course,
+    delay: f64,
 }
 
 /// How soon a file is needed. The file that is fetched earlier, and given up later, is less.
@@ -32,7 +39,7 @@ pub(super) struct Urgency {
     pub(super) is_wanted: bool,
     /// Seconds until a player reaches the file; infinite if none does.
     reached_in: f64,
-    /// The same with those of its layer.
+    /// The same with the delay of that player, and the seconds of the layer.
     next_use: f64,
     layer: u32,
 }
@@ -40,16 +47,18 @@ pub(super) struct Urgency {
 impl Demand {
     /// Returns what players need that look ahead as many seconds of playing.
     pub(super) fn new(heads: &[Playhead], axis: Axis, ahead: f64) -> Self {
-        let mut courses: Vec<Course> = heads.iter().map(|head| Course::new(head, axis)).collect();
+        // NaN counts as 0.
+        let player = |head: &Playhead| Player { course: Course::new(head, axis), delay: head.delay.max(0.0) };
+        let mut players: Vec<Player> = heads.iter().map(player).collect();
         // Those of a crowd that plays in step.
-        courses.dedup();
-        Self { courses, ahead }
+        players.dedup();
+        Self { players, ahead }
     }
 
     /// Returns the urgency of a file: that for the player that needs it first.
     pub(super) fn urgency(&self, file: usize, chunk: &ChunkFile) -> Urgency {
-        let reached = self.courses.iter().map(|course| course.seconds_until(chunk.stretches));
-        self.urgency_in(reached.fold(f64::INFINITY, f64::min), file, chunk)
+        let of_each = self.players.iter().map(|player| self.urgency_for(player, file, chunk));
+        of_each.min().unwrap_or_else(|| self.urgency_in(f64::INFINITY, 0.0, file, chunk))
     }
 
     /// Returns the `count` most urgent files for each player, in the order of their urgency. `reached` are files that a
@@ -60,19 +69,22 @@ impl Demand {
         reached: impl Fn([u32; 2]) -> F,
     ) -> BTreeSet<Urgency> {
         let mut of_all = BTreeSet::new();
-        for course in &self.courses {
-            let files = course.ways_within(self.ahead).flat_map(&reached);
-            let urgency = |(file, chunk): (usize, &ChunkFile)| {
-                self.urgency_in(course.seconds_until(chunk.stretches), file, chunk)
-            };
-            of_all.append(&mut most_urgent(count, files.map(urgency)));
+        for player in &self.players {
+            let files = player.course.ways_within(self.ahead).flat_map(&reached);
+            let urgencies = files.map(|(file, chunk)| self.urgency_for(player, file, chunk));
+            of_all.append(&mut most_urgent(count, urgencies));
         }
         of_all
     }
 
-    /// Returns the urgency of a file that is reached in some seconds.
-    fn urgency_in(&self, reached_in: f64, file: usize, chunk: &ChunkFile) -> Urgency {
-        let next_use = reached_in + LAYER_SECONDS * f64::from(chunk.layer);
+    /// Returns the urgency of a file for one of the players.
+    fn urgency_for(&self, player: &Player, file: usize, chunk: &ChunkFile) -> Urgency {
+        self.urgency_in(player.course.seconds_until(chunk.stretches), player.delay, file, chunk)
+    }
+
+    /// Returns the urgency of a file that is reached in some seconds, by a player with some delay.
+    fn urgency_in(&self, reached_in: f64, delay: f64, file: usize, chunk: &ChunkFile) -> Urgency {
+        let next_use = reached_in + delay + LAYER_SECONDS * f64::from(chunk.layer);
         Urgency { file, is_wanted: reached_in <= self.ahead, reached_in, next_use, layer: chunk.layer }
     }
 }
@@ -141,9 +153,12 @@ mod tests {
 
     /// Four stretches of a second.
     fn demand(heads: &[(f64, f64)], ahead: f64) -> Demand {
-        let head = |(seconds, velocity)| Playhead { seconds, velocity, range: [0.0, 4.0], turn: Turn::Stop };
-        let heads: Vec<Playhead> = heads.iter().copied().map(head).collect();
+        let heads: Vec<Playhead> = heads.iter().map(|(seconds, velocity)| head(*seconds, *velocity, 0.0)).collect();
         Demand::new(&heads, Axis::new(4.0, 4), ahead)
+    }
+
+    fn head(seconds: f64, velocity: f64, delay: f64) -> Playhead {
+        Playhead { seconds, velocity, range: [0.0, 4.0], turn: Turn::Stop, delay }
     }
 
     fn file(stretches: [u32; 2], layer: u32) -> ChunkFile {
@@ -164,6 +179,20 @@ mod tests {
         assert_eq!([0, 1, 2, 3].map(seconds), [0.0, 0.375, 0.125, 0.0], "minimum over the players");
         let nobody = demand(&[], 10.0);
         assert_eq!(nobody.urgency(0, &file([0, 3], 0)).seconds(), f64::INFINITY, "no player, no need");
+    }
+
+    #[test]
+    fn a_player_with_a_delay_comes_after_the_others() {
+        let delayed = |delay| Demand::new(&[head(0.5, 0.0, delay), head(2.5, 1.0, 0.0)], Axis::new(4.0, 4), 0.0);
+        let both = delayed(1e-3);
+        let seconds = |stretch, layer| both.urgency(0, &file([stretch; 2], layer)).seconds();
+        assert_eq!([seconds(0, 0), seconds(2, 0), seconds(2, 1)], [1e-3, 0.0, 1.5], "after layer 0 of the other");
+        assert_eq!(seconds(1, 0), f64::INFINITY, "a delay reaches no further file");
+        assert_eq!(both.urgency(0, &file([0, 2], 0)).seconds(), 0.0, "a file of both is as urgent as for the other");
+        for none in [0.0, -1.0, f64::NAN] {
+            let urgency = delayed(none).urgency(0, &file([0, 0], 0));
+            assert_eq!(urgency.seconds(), 0.0, "a delay of {none} is none");
+        }
     }
 
     #[test]
@@ -239,6 +268,6 @@ mod tests {
 
     #[test]
     fn players_in_step_count_once() {
-        assert_eq!(demand(&[(0.5, 1.0); 9], 1.0).courses.len(), 1, "nine players at one time");
+        assert_eq!(demand(&[(0.5, 1.0); 9], 1.0).players.len(), 1, "nine players at one time");
     }
 }

@@ -5,7 +5,8 @@
 //! On<CaptureFailed>| ..)`.
 //!
 //! They are sent in `PreUpdate`, in [`CaptureAssetSystems`](super::CaptureAssetSystems) and, for captures that the GPU
-//! cannot draw, after it: systems in `Update` read them in the same frame.
+//! cannot draw, after it: systems in `Update` read them in the same frame. Those about chunk files are sent in
+//! `Update`.
 
 use super::failure::CaptureFailure;
 use crate::plugin::component::GaussianCapture;
@@ -47,6 +48,9 @@ pub struct CaptureReady {
 ///
 /// Sent once for each entity until loading succeeds or fails with another error, independent of the number of attempts.
 /// Bevy also logs the error of every attempt.
+///
+/// Of a capture in chunk files also sent, once for each entity, if the most important Gaussians of its time may never
+/// be there: they do not fit the budget, or cannot be loaded. Loading goes on, and the state of the entity stays.
 ///
 /// # Examples
 ///

@@ -4,8 +4,9 @@
 
 use super::{CaptureLight, CastsShadows, ReceivesShadows, contact_shadow, order, shade, shadow};
 use crate::plugin::render::has_captures;
-use crate::plugin::stream::copy_to_parts;
+use crate::plugin::stream::{copy_to_parts, mark_parts};
 use bevy::app::{App, Plugin};
+use bevy::light::{NotShadowCaster, NotShadowReceiver};
 use bevy::render::RenderApp;
 
 /// Combines captures with lit meshes: fog, shadows, light of the scene. Part of
@@ -34,5 +35,7 @@ fn add_once(app: &mut App) {
         copy_to_parts::<CastsShadows>(app);
         copy_to_parts::<ReceivesShadows>(app);
         copy_to_parts::<CaptureLight>(app);
+        mark_parts::<NotShadowCaster>(app);
+        mark_parts::<NotShadowReceiver>(app);
     }
 }

@@ -1,9 +1,9 @@
 //! The messages about streaming.
 //!
-//! In: a change of whether the most important Gaussians of a time are there. Out: each message in two ways: as a message
-//! for a `MessageReader`, and as an event on that entity for observers.
+//! In: a change of whether the most important Gaussians of a time are there, or why they may never be. Out: each
+//! message in two ways: as a message for a `MessageReader`, and as an event on that entity for observers.
 
-use crate::plugin::asset::send;
+use crate::plugin::asset::{CaptureFailed, CaptureFailure, send};
 use bevy::ecs::entity::Entity;
 use bevy::ecs::event::EntityEvent;
 use bevy::ecs::message::{Message, MessageWriter};
@@ -20,7 +20,7 @@ pub struct CaptureBuffering {
     pub seconds: f32,
 }
 
-/// The most important Gaussians of an entity's time are there again, or for the first time.
+/// The most important Gaussians of an entity's time are there again, or for its first picture.
 #[derive(Message, EntityEvent, Debug, Clone, PartialEq)]
 pub struct CaptureBuffered {
     /// The entity with the capture.
@@ -46,6 +46,7 @@ pub(super) struct Announcer<'w, 's> {
     buffering: MessageWriter<'w, CaptureBuffering>,
     buffered: MessageWriter<'w, CaptureBuffered>,
     stalled: MessageWriter<'w, CaptureStalled>,
+    failed: MessageWriter<'w, CaptureFailed>,
 }
 
 impl Announcer<'_, '_> {
@@ -59,5 +60,9 @@ impl Announcer<'_, '_> {
 
     pub(super) fn stalled(&mut self, entity: Entity, seconds: f32) {
         send(&mut self.commands, &mut self.stalled, CaptureStalled { entity, seconds });
+    }
+
+    pub(super) fn failed(&mut self, entity: Entity, error: CaptureFailure) {
+        send(&mut self.commands, &mut self.failed, CaptureFailed { entity, error });
     }
 }

@@ -23,6 +23,7 @@
 //! as well.
 
 mod copies;
+mod faults;
 mod heads;
 mod messages;
 mod parts;
@@ -34,7 +35,7 @@ mod streams;
 
 pub use super::component::CapturePart;
 #[cfg(feature = "pbr")]
-pub(crate) use copies::copy_to_parts;
+pub(crate) use copies::{copy_to_parts, mark_parts};
 pub use messages::{CaptureBuffered, CaptureBuffering, CaptureStalled};
 pub use plugin::{CaptureStreamPlugin, CaptureStreamSystems};
 pub use settings::{CaptureStreamSettings, OnUnderrun, StreamBudget};

@@ -5,12 +5,13 @@
 
 use super::heads::playhead;
 use super::messages::Announcer;
-use super::settings::{CaptureStreamSettings, OnUnderrun};
+use super::settings::{CaptureStreamSettings, OnUnderrun, StreamBudget};
 use super::state::CaptureStreamState;
 use super::streams::{Stream, Streams};
 use crate::plugin::asset::{CaptureState, Uploads};
 use crate::plugin::component::{CapturePart, GaussianCapture, GaussianCapture3d};
 use crate::plugin::playback::{Playback, Stall};
+use crate::plugin::render::logged::warn_once_each;
 use bevy::asset::{AssetId, Assets};
 use bevy::ecs::change_detection::DetectChangesMut;
 use bevy::ecs::component::Component;
@@ -31,6 +32,8 @@ pub(super) struct Parts {
     shown: Option<f32>,
     /// Whether the most important Gaussians of the playback's time are missing.
     is_buffering: bool,
+    /// Whether it has been said why those Gaussians may never be there.
+    is_fault_reported: bool,
     /// The entities of files.
     entities: BTreeMap<usize, Entity>,
 }
@@ -116,6 +119,7 @@ pub(super) fn show_parts(
     streams: Res<Streams>,
     captures: Res<Assets<GaussianCapture>>,
     uploads: Res<Uploads>,
+    budget: Res<StreamBudget>,
     mut placed: Query<Shown>,
     mut playing: Query<&mut Playback>,
     mut commands: Commands,
@@ -143,12 +147,19 @@ pub(super) fn show_parts(
         if coverage.is_coarse && !had_picture {
             uploads.show_stream(id);
         }
-        if parts.is_buffering == coverage.is_coarse {
-            parts.is_buffering = !coverage.is_coarse;
-            match coverage.is_coarse {
-                true => announcer.buffered(entity, playback.time),
-                false => announcer.buffering(entity, playback.time),
-            }
+        match coverage.is_coarse {
+            true if parts.is_buffering || !had_picture => announcer.buffered(entity, playback.time),
+            false if !parts.is_buffering => announcer.buffering(entity, playback.time),
+            _ => {}
+        }
+        parts.is_buffering = !coverage.is_coarse;
+        if parts.is_buffering
+            && !parts.is_fault_reported
+            && let Some(fault) = stream.fault(id, playback.time.into(), &budget)
+        {
+            parts.is_fault_reported = true;
+            warn_once_each(&fault.to_string());
+            announcer.failed(entity, fault);
         }
         if had_picture && waits && !stall.0 {
             announcer.stalled(entity, playback.time);
@@ -161,6 +172,7 @@ pub(super) fn show_parts(
             resident: coverage.resident,
             share: coverage.share(),
             is_coarse: coverage.is_coarse,
+            retries: schedule.needed_at(playback.time.into()).filter(|file| schedule.waits(*file)).count(),
             buffered_seconds: schedule.buffered(&playhead(&playback, index.duration_seconds())) as f32,
             requests: schedule.requested(),
             gpu_bytes: schedule.gpu_bytes(),

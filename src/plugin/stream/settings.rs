@@ -11,8 +11,8 @@ use bevy::reflect::std_traits::ReflectDefault;
 
 /// What all captures in chunk files together may take: a resource.
 ///
-/// Several captures share the memory on the GPU: a capture that cameras see has more than one that they do not, a near
-/// one more than a far one.
+/// Several captures share the memory on the GPU by how near they are to a camera: the share of a capture at twice the
+/// distance is half as large. A capture that no camera sees counts as 16 times as far away.
 ///
 /// # Examples
 ///
@@ -35,7 +35,8 @@ pub struct StreamBudget {
     /// Bytes in memory of files on their way to the GPU: the files, and their Gaussians. A file that alone is larger
     /// is loaded while no other is. Default: 512 MiB.
     pub host_bytes: u64,
-    /// Files on their way at once. Default: 4.
+    /// Files on their way at once. Each capture with something to load has one, as far as they go, and that with the
+    /// largest share of the memory the rest. Default: 4.
     pub requests: u32,
     /// How far ahead of what is played files are loaded, seconds of playing, at most 600. Default: 10.
     pub ahead_seconds: f32,
@@ -55,8 +56,8 @@ impl Default for StreamBudget {
 pub struct CaptureStreamSettings {
     /// What is drawn while the most important Gaussians of a time are not there. Default: [`OnUnderrun::Coarse`].
     pub on_underrun: OnUnderrun,
-    /// Times to which the game may jump, seconds since the capture's start: what they need is loaded as soon as what is
-    /// played, and kept. Default: none.
+    /// Times to which the game may jump, seconds since the capture's start: what they need is loaded right after what
+    /// is drawn now, and kept as long as there is room for both. Default: none.
     pub preload: Vec<f32>,
 }
 

@@ -38,6 +38,8 @@ pub struct CaptureStreamState {
     pub share: f32,
     /// Whether the most important Gaussians of the playback's time are there.
     pub is_coarse: bool,
+    /// Files of the playback's time that could not be loaded, and are asked for again in a few seconds.
+    pub retries: usize,
     /// Seconds of playing, from the playback's time on, whose most important Gaussians are there.
     pub buffered_seconds: f32,
     /// Files of the capture on their way.

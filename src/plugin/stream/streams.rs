@@ -4,24 +4,28 @@
 //! [`Streams`], which holds a handle to each file that is there or on its way: the asset server loads files with their
 //! first handle, and frees them with their last.
 
+use super::faults::{fault, without_folder};
 use super::heads::{playhead, still};
 use super::settings::{CaptureStreamSettings, StreamBudget};
-use super::shares::{Sight, shares};
+use super::shares::{OnTheWay, Sight, ask_in_turns, shares};
 use super::state::CaptureStreamState;
 use crate::codec::stream::{FileState, Playhead, StreamLimits, StreamSchedule};
-use crate::plugin::asset::{CaptureLoaderSettings, Uploads};
+use crate::plugin::asset::{CaptureFailure, CaptureLoaderSettings, Uploads};
 use crate::plugin::component::{CapturePart, GaussianCapture, GaussianCapture3d};
 use crate::plugin::playback::Playback;
-use crate::scene::ChunkTable;
+use crate::plugin::render::logged::error_once_each;
+use crate::scene::{ChunkTable, ColorCodebooks};
 use bevy::asset::{AssetId, AssetPath, AssetServer, Assets, Handle, RenderAssetUsages};
 use bevy::camera::Camera;
 use bevy::camera::visibility::ViewVisibility;
+use bevy::ecs::change_detection::DetectChanges;
 use bevy::ecs::hierarchy::Children;
 use bevy::ecs::query::{With, Without};
 use bevy::ecs::resource::Resource;
 use bevy::ecs::system::{Query, Res, ResMut};
 use bevy::log::debug_span;
 use bevy::platform::time::Instant;
+use bevy::render::renderer::RenderDevice;
 use bevy::transform::components::GlobalTransform;
 use glam::Vec3;
 use std::collections::{BTreeMap, HashMap};
@@ -53,17 +57,39 @@ pub(super) struct Stream {
     pub(super) schedule: StreamSchedule,
     /// The index, in whose folder the files are; `None` for an index that was not loaded from a file.
     index: Option<AssetPath<'static>>,
+    /// The codebooks of colors, which the index has for all files.
+    codebooks: Option<Arc<ColorCodebooks>>,
     files: HashMap<usize, Handle<GaussianCapture>>,
 }
 
 impl Stream {
     fn new(table: Arc<ChunkTable>, duration: f32, index: Option<AssetPath<'static>>) -> Self {
-        Self { schedule: StreamSchedule::new(table, duration.into()), index, files: HashMap::new() }
+        let schedule = StreamSchedule::new(table, duration.into());
+        Self { schedule, index, codebooks: None, files: HashMap::new() }
     }
 
     /// Returns the handle of a file that is there.
     pub(super) fn resident(&self, file: usize) -> Option<&Handle<GaussianCapture>> {
         self.files.get(&file).filter(|_| self.schedule.state(file) == FileState::Resident)
+    }
+
+    /// Returns why the most important Gaussians of a time of the index `id` may never be there, in seconds since the
+    /// capture's start.
+    pub(super) fn fault(
+        &self,
+        id: AssetId<GaussianCapture>,
+        seconds: f64,
+        budget: &StreamBudget,
+    ) -> Option<CaptureFailure> {
+        match &self.index {
+            Some(index) => fault(&self.schedule, seconds, budget.gpu_bytes, index),
+            None => Some(without_folder(id)),
+        }
+    }
+
+    /// Returns the files on their way.
+    fn on_the_way(&self) -> OnTheWay {
+        OnTheWay { requests: self.schedule.requested(), host_bytes: self.schedule.host_bytes() }
     }
 
     /// Tells the schedule of the files that have arrived or failed since the last frame.
@@ -74,12 +100,23 @@ impl Stream {
                 return true;
             }
             let id = handle.id();
-            let is_loaded = captures.contains(id);
-            if server.get_load_state(id).is_some_and(|state| state.is_failed()) || is_loaded && uploads.has_failed(id) {
+            let loaded = captures.get(id);
+            let most = schedule.table().files.get(file).map_or(0, |chunk| chunk.gaussians);
+            // Its Gaussians are in memory until the end of the frame in which it is loaded.
+            let count = loaded.map_or(0, |capture| capture.scene().len() as u64);
+            if count > most {
+                let path = server.get_path(id).map(|path| path.to_string()).unwrap_or_default();
+                error_once_each(&format!(
+                    "{path}: {count} Gaussians, and the index says {most}, by which memory is counted, so that the \
+                     file is not drawn: copy the index and all files of the capture again"
+                ));
+            }
+            let is_refused = count > most || loaded.is_some() && uploads.has_failed(id);
+            if is_refused || server.get_load_state(id).is_some_and(|state| state.is_failed()) {
                 schedule.failed(file, now);
                 return false;
             }
-            if is_loaded && !uploads.awaits(id) {
+            if loaded.is_some() && !uploads.awaits(id) {
                 schedule.arrived(file);
             }
             true
@@ -97,9 +134,20 @@ impl Stream {
                 self.schedule.failed(file, now);
                 continue;
             };
+            // The asset server stops reading a file whose last handle is dropped, but has one itself until the file is
+            // open: over the web, until all of it is there. A load joins such a read. After a deadline, the file is
+            // therefore read once more beside it.
+            let is_stuck = self.schedule.failures_in_a_row(file) > 0 && server.get_path_id(&path).is_some();
             // A file is drawn, and neither picked nor saved.
-            let drawn = |settings: &mut CaptureLoaderSettings| settings.asset_usage = RenderAssetUsages::RENDER_WORLD;
-            self.files.insert(file, server.load_builder().with_settings(drawn).load(path));
+            let codebooks = self.codebooks.clone();
+            let drawn = move |settings: &mut CaptureLoaderSettings| {
+                settings.asset_usage = RenderAssetUsages::RENDER_WORLD;
+                settings.read.codebooks.clone_from(&codebooks);
+            };
+            self.files.insert(file, server.load_builder().with_settings(drawn).load(&path));
+            if is_stuck {
+                server.reload(path);
+            }
         }
     }
 
@@ -132,10 +180,13 @@ pub(super) fn fetch_files(
     placed: Query<Placed, Without<CapturePart>>,
     seen: Query<&ViewVisibility, With<CapturePart>>,
     cameras: Query<(&Camera, &GlobalTransform)>,
+    device: Option<Res<RenderDevice>>,
     mut streams: ResMut<Streams>,
 ) {
     let _span = debug_span!("gs4d/stream").entered();
     let now = streams.began.elapsed().as_secs_f64();
+    // The Gaussians of files were on the device only.
+    let is_device_new = device.is_some_and(|device| device.is_changed());
     let mut wanted: BTreeMap<AssetId<GaussianCapture>, (Vec<Playhead>, Sight)> = BTreeMap::new();
     let eyes: Vec<Vec3> =
         cameras.iter().filter(|(camera, _)| camera.is_active).map(|(_, place)| place.translation()).collect();
@@ -145,16 +196,18 @@ pub(super) fn fetch_files(
         let Some(table) = &capture.scene().chunks else { continue };
         let duration = capture.duration_seconds();
         match streams.streams.get(&id).map(|stream| Arc::ptr_eq(stream.schedule.table(), table)) {
-            Some(true) => {}
+            Some(true) if !is_device_new => {}
             // The files of an index that has been loaded again may be others: they are loaded in the next frame, when
             // those of before are no longer assets.
-            Some(false) => {
+            Some(_) => {
                 wanted.remove(&id);
                 continue;
             }
             None => {
                 let index = server.get_path(id).map(AssetPath::into_owned);
-                streams.streams.insert(id, Stream::new(table.clone(), duration, index));
+                let codebooks = capture.scene().form.coded_colors().map(|colors| colors.codebooks.clone());
+                let stream = Stream { codebooks, ..Stream::new(table.clone(), duration, index) };
+                streams.streams.insert(id, stream);
             }
         }
         let (heads, sight) = wanted.entry(id).or_default();
@@ -179,23 +232,83 @@ pub(super) fn fetch_files(
         stream.notice(now, &server, &captures, &uploads);
     }
     let shares = shares(wanted.values().map(|(_, sight)| sight));
-    let on_the_way = |stream: &Stream| (stream.schedule.requested(), stream.schedule.host_bytes());
-    let mut ways: HashMap<_, _> = streams.streams.iter().map(|(id, stream)| (*id, on_the_way(stream))).collect();
-    // Those with the largest shares ask first.
-    let mut order: Vec<_> = wanted.iter().zip(shares).collect();
-    order.sort_by(|(_, a), (_, b)| b.total_cmp(a));
-    for ((id, (heads, _)), share) in order {
-        let others = ways.iter().filter(|(other, _)| *other != id).map(|(_, way)| *way);
-        let (requests, host) = others.fold((0, 0u64), |(a, b), (c, d)| (a + c, b.saturating_add(d)));
-        let limits = StreamLimits {
-            gpu_bytes: (budget.gpu_bytes as f64 * share) as u64,
-            host_bytes: budget.host_bytes.saturating_sub(host),
-            requests: (budget.requests as usize).saturating_sub(requests),
-            ahead: budget.ahead_seconds.into(),
-        };
-        if let Some(stream) = streams.streams.get_mut(id) {
-            stream.follow(now, heads, &limits, &server);
-            ways.insert(*id, on_the_way(stream));
+    // Those that are wanted, in the same order.
+    let asking = streams.streams.values_mut().zip(wanted.values()).zip(shares);
+    let mut asking: Vec<_> = asking.map(|((stream, (heads, _)), share)| (stream, heads, share)).collect();
+    asking.sort_by(|(.., a), (.., b)| b.total_cmp(a));
+    let mut on_the_way: Vec<OnTheWay> = asking.iter().map(|(stream, ..)| stream.on_the_way()).collect();
+    let most = OnTheWay { requests: budget.requests as usize, host_bytes: budget.host_bytes };
+    ask_in_turns(most, &mut on_the_way, |number, OnTheWay { requests, host_bytes }| {
+        let (stream, heads, share) = &mut asking[number];
+        let gpu_bytes = (budget.gpu_bytes as f64 * *share) as u64;
+        let limits = StreamLimits { gpu_bytes, host_bytes, requests, ahead: budget.ahead_seconds.into() };
+        stream.follow(now, heads, &limits, &server);
+        stream.on_the_way()
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plugin::asset::CaptureAssetPlugin;
+    use crate::scene::ChunkFile;
+    use bevy::MinimalPlugins;
+    use bevy::app::App;
+    use bevy::asset::io::{AssetReader, AssetReaderError, AssetSourceBuilder, PathStream, Reader, VecReader};
+    use bevy::asset::{AssetApp, AssetPlugin};
+    use std::future::pending;
+    use std::path::Path;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+    use std::time::Duration;
+
+    /// An asset source whose reads never end. It counts them.
+    #[derive(Default, Clone)]
+    struct Endless(Arc<AtomicUsize>);
+
+    impl AssetReader for Endless {
+        async fn read<'a>(&'a self, _: &'a Path) -> Result<impl Reader + 'a, AssetReaderError> {
+            self.0.fetch_add(1, Ordering::Relaxed);
+            pending::<Result<VecReader, AssetReaderError>>().await
         }
+
+        async fn read_meta<'a>(&'a self, path: &'a Path) -> Result<impl Reader + 'a, AssetReaderError> {
+            Err::<VecReader, _>(AssetReaderError::NotFound(path.to_owned()))
+        }
+
+        async fn read_directory<'a>(&'a self, path: &'a Path) -> Result<Box<PathStream>, AssetReaderError> {
+            Err(AssetReaderError::NotFound(path.to_owned()))
+        }
+
+        async fn is_directory<'a>(&'a self, _: &'a Path) -> Result<bool, AssetReaderError> {
+            Ok(false)
+        }
+    }
+
+    #[test]
+    fn a_file_whose_read_does_not_end_is_read_again() {
+        let source = Endless::default();
+        let reads = source.0.clone();
+        let mut app = App::new();
+        app.register_asset_source("endless", AssetSourceBuilder::new(move || Box::new(source.clone())));
+        app.add_plugins((MinimalPlugins, AssetPlugin::default(), CaptureAssetPlugin));
+        let files = vec![ChunkFile { stretches: [0, 0], layer: 0, gaussians: 1, bytes: 1 }];
+        let table = ChunkTable { stretches: 1, gaussian_bytes: 88, files };
+        let mut stream = Stream::new(table.into(), 1.0, Some("endless://index.gs4d".into()));
+        // The first request, its deadline, and the second request.
+        for (now, is_requested, count) in [(0.0, true, 1), (31.0, false, 1), (31.5, true, 2)] {
+            let server = app.world().resource::<AssetServer>().clone();
+            stream.follow(now, &[still(0.0)], &StreamLimits::default(), &server);
+            let state = (stream.files.len() == 1, stream.schedule.requested() == 1);
+            assert_eq!(state, (is_requested, is_requested), "at {now} s the file is on its way, or is not");
+            let began = Instant::now();
+            while reads.load(Ordering::Relaxed) < count {
+                assert!(began.elapsed() < Duration::from_secs(60), "at {now} s the file has been read {count} times");
+                app.update();
+                std::thread::sleep(Duration::from_millis(2));
+            }
+            app.update();
+        }
+        assert_eq!(reads.load(Ordering::Relaxed), 2, "once for each request");
+        assert_eq!((stream.schedule.failures(), stream.schedule.failures_in_a_row(0)), (1, 1), "one has failed");
     }
 }

@@ -163,19 +163,23 @@ fn uploading(world: &mut World) -> Vec<String> {
     let mut streamed = world.query::<(&GaussianCapture3d, &CaptureStreamState)>();
     let players = players(world);
     let Some(loaded) = world.get_resource::<Assets<GaussianCapture>>() else { return Vec::new() };
-    // Pictures are taken of all Gaussians that the budget leaves room for.
-    let is_coarse = |state: &CaptureStreamState| !state.is_coarse || !state.is_whole() && state.requests > 0;
-    let coarse = streamed.iter(world).filter(|(_, state)| is_coarse(state)).map(|(capture, _)| capture.0.id());
+    let streaming = streamed.iter(world).filter(|(_, state)| is_streaming(state)).map(|(capture, _)| capture.0.id());
     let waiting = spawned.iter(world).filter(|(_, state)| **state == CaptureState::Loading);
     let waiting = waiting.map(|(capture, _)| capture.0.id()).filter(|id| loaded.contains(*id));
     // Captures of later clips are on no entity yet, and timelines wait for them.
     let uploads = world.get_resource::<Uploads>();
     let is_awaited = |id: AssetId<GaussianCapture>| uploads.is_some_and(|uploads| uploads.awaits(id));
     let clips = clips(world, &players).into_iter().filter(|id| loaded.contains(*id) && is_awaited(*id));
-    let waiting = waiting.chain(clips).chain(coarse);
+    let waiting = waiting.chain(clips).chain(streaming);
     // Of changed captures, the older version is drawn.
     let changed = world.get_resource::<CaptureStatistics>().map_or(0, CaptureStatistics::uploading_captures);
     waiting.map(|id| id.to_string()).chain((changed > 0).then(|| format!("{changed} changed captures"))).collect()
+}
+
+/// Returns whether a picture would lack Gaussians that are still being loaded. Those that the budget leaves no room for
+/// are not.
+fn is_streaming(state: &CaptureStreamState) -> bool {
+    !state.is_coarse || !state.is_whole() && (state.requests > 0 || state.retries > 0)
 }
 
 fn captures(world: &mut World) -> Vec<UntypedAssetId> {
@@ -234,6 +238,17 @@ mod tests {
         app.add_plugins((MinimalPlugins, Endless));
         let waited = finish_plugins(&mut app, Duration::from_millis(5));
         assert!(matches!(waited, Err(TestingError::Slow { .. })), "waiting ends after the limit: {waited:?}");
+    }
+
+    #[test]
+    fn pictures_wait_for_files_on_their_way_and_for_retries() {
+        let coarse = || CaptureStreamState { is_coarse: true, needed: 2, resident: 1, ..CaptureStreamState::default() };
+        assert!(!is_streaming(&coarse()), "the budget has no room for the other file");
+        assert!(is_streaming(&CaptureStreamState { requests: 1, ..coarse() }), "the file is on its way");
+        assert!(is_streaming(&CaptureStreamState { retries: 1, ..coarse() }), "the file has failed");
+        let whole = CaptureStreamState { resident: 2, requests: 1, ..coarse() };
+        assert!(!is_streaming(&whole), "a file of a later time is on its way");
+        assert!(is_streaming(&CaptureStreamState::default()), "there is no picture yet");
     }
 
     #[test]
