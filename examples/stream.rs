@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! cargo run --release --features viewer --example stream -- INDEX [--link MBIT] [--latency MS] [--lose PERCENT] \
-//!     [--gpu MIB] [--host MIB] [--seconds S] [--whole CAPTURE] [--size WIDTHxHEIGHT] [--headless FOLDER] [--frames N]
+//!     [--outage S] [--halve] [--gpu MIB] [--host MIB] [--seconds S] [--whole CAPTURE] [--size WIDTHxHEIGHT] [--headless FOLDER] [--frames N]
 //! ```
 //!
 //! * drag with the left button: orbit; wheel: nearer and farther
@@ -14,6 +14,8 @@
 //! * `--link MBIT`, `--latency MS`, `--lose PERCENT`: files come over a simulated link of so many megabits a second,
 //!   with a delay from a request to its first byte, on which a part of the requests fail. It is no network: bytes come
 //!   from the disk and are held back. Without these options they are not
+//! * `--outage S`, `--halve`: after playing has been measured, the link stops for so many seconds, and has half its rate
+//!   from then on; the next ten seconds are measured
 //! * `--gpu MIB`, `--host MIB`: memory for the capture, by default 1024 on the GPU and 512 for files on their way
 //!
 //! With `--headless FOLDER`, or without a display, it measures in real time: how long the first picture takes, then S

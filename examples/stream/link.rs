@@ -1,7 +1,7 @@
 //! A simulated link: an asset source whose files arrive with a delay and at a rate, or not at all.
 //!
 //! In: a folder, the quality of the link. Out: the asset source `link`, and what came over it. It is no network: bytes
-//! come from the disk and are held back until they would have arrived. A network also slows down and stops.
+//! come from the disk and are held back until they would have arrived. On request it stops for a while, or slows down.
 
 use crate::figures::scattered;
 use crate::timer::Timer;
@@ -24,6 +24,17 @@ pub struct Quality {
     pub latency: Duration,
     /// The share of the requests that fail, 0 to 1.
     pub lost: f64,
+    /// How long the link stops when it is [disturbed](Link::disturb).
+    pub outage: Duration,
+    /// Whether it has half the rate from then on.
+    pub halves: bool,
+}
+
+impl Quality {
+    /// Returns whether the link can be disturbed.
+    pub fn is_disturbed(&self) -> bool {
+        self.halves || !self.outage.is_zero()
+    }
 }
 
 impl fmt::Display for Quality {
@@ -45,6 +56,8 @@ impl fmt::Display for Quality {
 pub struct Traffic {
     /// When the last byte of all requests so far arrives.
     busy: Option<Instant>,
+    /// Whether it has half the rate.
+    is_halved: bool,
     pub requests: u64,
     /// Requests that failed on purpose.
     pub lost: u64,
@@ -78,6 +91,18 @@ impl Link {
         *self.lock()
     }
 
+    /// Returns how good the link is.
+    pub fn quality(&self) -> &Quality {
+        &self.quality
+    }
+
+    /// Stops the link for a while, and slows it down, as far as its quality says so. What is on its way arrives before.
+    pub fn disturb(&self) {
+        let (mut traffic, now) = (self.lock(), Instant::now());
+        traffic.busy = Some(traffic.busy.map_or(now, |busy| busy.max(now)) + self.quality.outage);
+        traffic.is_halved = self.quality.halves;
+    }
+
     fn lock(&self) -> MutexGuard<'_, Traffic> {
         self.traffic.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -98,7 +123,8 @@ impl Link {
         let mut traffic = self.lock();
         let first = asked + self.quality.latency;
         let begin = traffic.busy.map_or(first, |busy| busy.max(first));
-        let seconds = self.quality.rate.map_or(0.0, |rate| 8.0 * bytes as f64 / rate);
+        let slower = if traffic.is_halved { 2.0 } else { 1.0 };
+        let seconds = self.quality.rate.map_or(0.0, |rate| 8.0 * bytes as f64 * slower / rate);
         let last = begin + Duration::from_secs_f64(seconds);
         traffic.busy = Some(last);
         traffic.bytes += bytes as u64;

@@ -40,6 +40,8 @@ impl Options {
             "--link" => self.link.rate = Some(within(1e-3..=1e6)? * 1e6),
             "--latency" => self.link.latency = Duration::from_secs_f64(within(0.0..=60e3)? * 1e-3),
             "--lose" => self.link.lost = within(0.0..=100.0)? * 1e-2,
+            "--outage" => self.link.outage = Duration::from_secs_f64(within(0.0..=60.0)?),
+            "--halve" => self.link.halves = true,
             "--gpu" => self.budget.gpu_bytes = bytes(within(1.0..=1e6)?),
             "--host" => self.budget.host_bytes = bytes(within(1.0..=1e6)?),
             "--seconds" => self.seconds = within(0.1..=3600.0)?,

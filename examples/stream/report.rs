@@ -1,4 +1,4 @@
-//! What streaming is like: the first picture, playing, seeks.
+//! What streaming is like: the first picture, playing, also while the link is disturbed, seeks.
 //!
 //! In: an app whose camera sees the capture, a link. Out: the entity with the capture; lines for each of these, and the
 //! numbers in them.
@@ -14,6 +14,8 @@ use std::time::Instant;
 
 /// Number of seeks.
 const SEEKS: u64 = 8;
+/// How long is measured after the link was disturbed, seconds.
+const AFTERWARDS: f64 = 10.0;
 
 /// How often the most important Gaussians were missing.
 #[derive(Resource, Default)]
@@ -55,6 +57,9 @@ pub fn report(app: &mut App, take: &Take, link: &Link, seconds: f64, figures: &m
     figures.add("first_coarse_s", format_args!("{:.3}", first.coarse));
     figures.add("first_whole_s", format_args!("{:.3}", first.whole));
     play(app, player, seconds, figures)?;
+    if link.quality().is_disturbed() {
+        disturb(app, player, link, figures)?;
+    }
     seek(app, player, take.seconds, figures)?;
     let (traffic, peak) = (link.traffic(), peak_memory().map_or(0.0, mebibytes));
     let (requests, lost, read) = (traffic.requests, traffic.lost, mebibytes(traffic.bytes));
@@ -121,6 +126,29 @@ fn play(app: &mut App, player: Entity, seconds: f64, figures: &mut Figures) -> R
     figures.add("host_mib", format_args!("{host:.1}"));
     figures.add("requests", requests);
     figures.add("failures", failures);
+    Ok(())
+}
+
+/// Disturbs the link, plays on, and reports how long pictures were coarse, or less.
+fn disturb(app: &mut App, player: Entity, link: &Link, figures: &mut Figures) -> Result {
+    let mut watch = Watch::new(app, player);
+    let began = Instant::now();
+    link.disturb();
+    // The last moment at which the picture was not even coarse, and not whole.
+    let (mut less, mut coarse) = (0.0, 0.0);
+    while began.elapsed().as_secs_f64() < AFTERWARDS {
+        let state = watch.frame()?.state;
+        let seconds = began.elapsed().as_secs_f64();
+        if !state.is_coarse {
+            less = seconds;
+        }
+        if !state.is_whole() {
+            coarse = seconds;
+        }
+    }
+    println!("after the link was disturbed: pictures were coarse until {coarse:.2} s, less until {less:.2} s");
+    figures.add("disturbed_coarse_s", format_args!("{coarse:.3}"));
+    figures.add("disturbed_less_s", format_args!("{less:.3}"));
     Ok(())
 }
 
