@@ -85,6 +85,11 @@ impl Renderer {
         &self.work
     }
 
+    /// Makes later captures share nothing with those so far: after an upload that has failed, whose buffers may be invalid.
+    pub fn forget_shared(&self) {
+        self.codebooks.forget();
+    }
+
     /// Returns an allocator for the resources of its views, its captures and its clients. The device must be the one
     /// the renderer was created on.
     pub fn allocator<'a>(&'a self, device: &'a wgpu::Device) -> Allocator<'a> {

@@ -4,11 +4,7 @@
 //! shortest prefix that has all Gaussians above it, so that a thinned capture is not read whole.
 
 use crate::scene::{Form, PackedScene, RuntimeScene};
-
-/// Most Gaussians of a layer that are decoded to find its least importance.
-const SAMPLE: usize = 4096;
-/// Importances change by less than this factor when they are packed.
-const ROUNDING: f32 = 1.1;
+use rayon::prelude::*;
 
 /// The Gaussians up to the end of a layer.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,16 +23,18 @@ impl Prefixes {
     /// Returns the prefixes of a scene. Layers of chunk files are not of descending importance.
     pub(super) fn of(scene: &RuntimeScene) -> Self {
         let Form::Packed(PackedScene { layers, runs: None, .. }) = &scene.form else { return Self::default() };
-        let starts = std::iter::once(0).chain(layers.iter().copied());
-        let prefix = |(start, &end): (usize, &usize)| {
-            let count = (end - start).min(SAMPLE);
-            let at = |step: usize| scene.gaussian(start + (step as u64 * (end - start) as u64 / count as u64) as usize);
-            // Fillers have opacity 0. The least importance of a sample is at least that of the layer.
-            let drawn = (0..count).map(at).filter(|gaussian| gaussian.opacity > 0.0);
-            let least = drawn.map(|gaussian| gaussian.importance()).fold(f32::INFINITY, f32::min);
-            Prefix { end, rest: ROUNDING * least }
-        };
-        Self(starts.zip(layers).map(prefix).collect())
+        let importance = |index: usize| scene.gaussian(index).importance();
+        let most = |from: usize, to: usize| (from..to).into_par_iter().map(importance).reduce(|| 0.0, f32::max);
+        let ends = layers.iter().skip(1).copied().chain([scene.len()]);
+        let mut prefixes: Vec<Prefix> =
+            layers.iter().zip(ends).map(|(&end, next)| Prefix { end, rest: most(end, next) }).collect();
+        // Packing may have changed the order a little.
+        let mut rest = 0.0_f32;
+        for prefix in prefixes.iter_mut().rev() {
+            rest = rest.max(prefix.rest);
+            prefix.rest = rest;
+        }
+        Self(prefixes)
     }
 
     /// Returns all prefixes.

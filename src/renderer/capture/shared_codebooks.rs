@@ -25,6 +25,11 @@ struct Shared {
 }
 
 impl SharedCodebooks {
+    /// Forgets all buffers, which captures that have them keep: one of them may be invalid, or not be filled.
+    pub(in crate::renderer) fn forget(&self) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).clear();
+    }
+
     /// Returns the buffer of the codebooks of these colors, and how it is filled, unless it has been filled.
     pub(super) fn claim(&self, allocator: Allocator<'_>, colors: &CodedColors) -> (wgpu::Buffer, Option<Filling>) {
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);

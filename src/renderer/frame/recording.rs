@@ -57,8 +57,9 @@ impl Recording<'_> {
                     pass.set_bind_group(0, group, &[index * INSTANCE_STRIDE]);
                     pass.set_bind_group(1, &part.geometry, &[]);
                     pass.set_bind_group(3, &part.color, &[]);
-                    let gaussians = batch.iter().map(|instance| instance.drawn(at)).max().unwrap_or_default();
-                    pass.dispatch_workgroups(groups(instance.capture.storage, gaussians), 1, count);
+                    // More Gaussians may need fewer workgroups: each thread then has several.
+                    let own = batch.iter().map(|instance| groups(instance.capture.storage, instance.drawn(at)));
+                    pass.dispatch_workgroups(own.max().unwrap_or_default(), 1, count);
                     // Instances that are drawn together have one part.
                     index += count;
                 }

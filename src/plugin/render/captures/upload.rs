@@ -263,6 +263,7 @@ impl RenderAsset for GpuGaussianCapture {
         let next = match NextCapture::new(device.wgpu_device(), renderer, source) {
             Ok(next) => Some(next),
             Err(failure) => {
+                renderer.0.forget_shared();
                 report(uploads, id, &name(), &failure);
                 None
             }
@@ -326,7 +327,10 @@ pub(in crate::plugin::render) fn continue_uploads(
                     uploads.finish(id);
                 }
             }
-            Err(failure) => report(&uploads, id, &name(&assets, id), &failure),
+            Err(failure) => {
+                renderer.0.forget_shared();
+                report(&uploads, id, &name(&assets, id), &failure);
+            }
         }
     }
 }
