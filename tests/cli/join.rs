@@ -236,6 +236,10 @@ fn each_packed_gaussian_is_in_a_file_of_its_times() {
         }
     }
     gs4d(&arguments!["split", &package, "-o", &chunks, "--chunk", "1"]).must_fail("--chunk has no effect on a packed");
+    // A lower cut-off makes all lifespans longer.
+    let longer = folder.path().join("longer.gs4d");
+    gs4d(&arguments!["convert", &package, &longer, "--cutoff", "0.01"]).text();
+    gs4d(&arguments!["split", &longer, "-o", &chunks]).must_fail("gs4d compress --chunk");
 }
 
 #[test]

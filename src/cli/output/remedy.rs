@@ -187,7 +187,9 @@ fn of_footage(error: &AnyError) -> Option<String> {
 fn of_segments(error: &AnyError) -> Option<String> {
     let remedy = match error.downcast_ref::<SegmentsError>()? {
         SegmentsError::Packed { .. } => " (gs4d bake --quality lossless writes one)",
-        SegmentsError::NoRuns { .. } => ": gs4d compress --chunk cuts the lossless capture that it was made from",
+        SegmentsError::NoRuns { .. } | SegmentsError::OtherRuns { .. } => {
+            ": gs4d compress --chunk cuts the lossless capture that it was made from"
+        }
         SegmentsError::Differs { what, .. } => of_shared(*what)?,
         SegmentsError::Still { .. } => " (gs4d convert --duration)",
         SegmentsError::Overlap { .. } => "; without --keep-times, it begins then",

@@ -38,8 +38,7 @@ Examples:
   gs4d join chunks -o long.gs4d
 
 The pictures of the joined chunks are those of IN. Its Gaussians are in the order of the chunks; split and joined once more, the files are the
-same byte for byte. Runs of fewer than 256 Gaussians become part of longer ones, and such layers of others; in packed captures, of fewer than
-2048.")]
+same byte for byte. Runs and layers of fewer than 256 Gaussians become part of others, packed runs of fewer than 2048.")]
 pub(crate) struct SplitVerb {
     #[command(flatten)]
     given: Given,

@@ -104,7 +104,8 @@ fn plain(header: &Header, count: usize) -> Header {
         StoredForm::Packed { codebooks: Some(_) } => Some([0; 4]),
         StoredForm::Packed { codebooks: None } | StoredForm::Trained { .. } | StoredForm::Sliced => None,
     };
-    let mut layers = header.layers.clone();
+    // Layers of chunk files are of descending importance within their stretches of time only.
+    let mut layers = if header.runs.is_some() { Vec::new() } else { header.layers.clone() };
     layers.retain(|&end| end < count);
     Header {
         form: StoredForm::Packed { codebooks },

@@ -83,6 +83,15 @@ pub enum SegmentsError {
         /// The capture.
         path: PathBuf,
     },
+    /// Packed Gaussians that are drawn at times at which their chunk file is not.
+    #[error(
+        "{}: was cut into chunks when it was compressed, and Gaussians are drawn at other times since: its cut-off or its \
+         temporal filter has changed", .path.display()
+    )]
+    OtherRuns {
+        /// The capture.
+        path: PathBuf,
+    },
     /// Something that all segments must have in common.
     #[error("{}: its {} is not that of {}", .path.display(), .what.name(), .first.display())]
     Differs {

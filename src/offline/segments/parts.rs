@@ -13,11 +13,11 @@ use rayon::prelude::*;
 
 /// Runs and layers of fewer Gaussians become part of others: a file costs more than they do.
 pub(crate) const LEAST: usize = 256;
-/// The same for packed Gaussians, which are a tenth of the bytes, and have whole blocks.
+/// The same for runs of packed Gaussians, which are a tenth of the bytes. Small first layers make the first picture soon.
 pub(crate) const LEAST_PACKED: usize = 2048;
 
 /// Returns the parts of a capture of `stretches` stretches of time: by first stretch, the shorter before the longer;
-/// those of the same stretches by layer.
+/// those of the same stretches by layer. Runs have at least `least` Gaussians.
 pub(crate) fn parts(
     gaussians: &[Gaussian],
     lives: &[[u32; 2]],
@@ -30,7 +30,7 @@ pub(crate) fn parts(
         .into_iter()
         .flat_map(|run| {
             let part = move |(layer, gaussians)| Part { stretches: run.chunks, layer, gaussians };
-            (0..).zip(layers(&run.gaussians, &importances, shares, least)).map(part)
+            (0..).zip(layers(&run.gaussians, &importances, shares, LEAST)).map(part)
         })
         .collect()
 }

@@ -11,7 +11,7 @@ use super::parts::{LEAST, lives, parts};
 use super::segment::Segment;
 use crate::offline::work::{FileError, Progress, proceed, save, save_chunk, write_settings};
 use crate::scene::packed::runs::Part;
-use crate::scene::{ChunkFile, ChunkTable, Form, GaussianScene, PackedScene, Runs, SceneForm};
+use crate::scene::{ChunkFile, ChunkTable, FilterKind, Form, GaussianScene, PackedScene, RunPart, Runs, SceneForm};
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -72,12 +72,22 @@ impl Split {
     /// Cuts a packed capture as it has been cut when it was compressed: no value changes.
     ///
     /// # Errors
-    /// A capture that has no runs.
+    /// A capture that has no runs, or whose Gaussians have been given longer lifespans since.
     pub fn of_runs(segment: &Segment) -> Result<Self, SegmentsError> {
         let SceneForm::Ready(Form::Packed(PackedScene { runs: Some(runs), .. })) = &segment.scene.form else {
             return Err(SegmentsError::NoRuns { path: segment.path.clone() });
         };
         let Runs { stretches, .. } = *runs;
+        let scene = &segment.scene;
+        let gaussians = scene.gaussians().map_err(|error| segment.at(error))?;
+        // As when it was compressed: a support filter follows from the lifespans.
+        let filter = scene.filter.as_ref().filter(|filter| filter.kind != FilterKind::Support);
+        let lives = lives(&gaussians, filter, &scene.trained_with, stretches);
+        let is_within =
+            |[first, last]: [u32; 2], part: &RunPart| part.stretches[0] <= first && last <= part.stretches[1];
+        if !runs.ranges().all(|(part, range)| lives[range].iter().all(|life| is_within(*life, part))) {
+            return Err(SegmentsError::OtherRuns { path: segment.path.clone() });
+        }
         let parts = runs.ranges().map(|(part, range)| {
             let gaussians = (range.start as u32..range.end as u32).collect();
             Part { stretches: part.stretches, layer: part.layer, gaussians }
