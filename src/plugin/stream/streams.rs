@@ -31,21 +31,33 @@ use glam::Vec3;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
+/// Longer frames count as this long, in seconds: an app that was suspended gives its requests time to end.
+const LONGEST_FRAME: f64 = 1.0;
+
 /// The streams of all captures in chunk files that entities show.
 #[derive(Resource)]
 pub(super) struct Streams {
-    /// The zero of the clock of schedules.
-    began: Instant,
+    /// The time of schedules, seconds, and when it was that. It does not pass while the app stands still.
+    now: f64,
+    updated: Instant,
     streams: BTreeMap<AssetId<GaussianCapture>, Stream>,
 }
 
 impl Default for Streams {
     fn default() -> Self {
-        Self { began: Instant::now(), streams: BTreeMap::new() }
+        Self { now: 0.0, updated: Instant::now(), streams: BTreeMap::new() }
     }
 }
 
 impl Streams {
+    /// Lets the time since the last frame pass, and returns the time.
+    fn pass_time(&mut self) -> f64 {
+        let updated = Instant::now();
+        self.now += updated.duration_since(self.updated).as_secs_f64().min(LONGEST_FRAME);
+        self.updated = updated;
+        self.now
+    }
+
     /// Returns the stream of a capture; `None` if it is not in chunk files.
     pub(super) fn of(&self, capture: AssetId<GaussianCapture>) -> Option<&Stream> {
         self.streams.get(&capture)
@@ -184,7 +196,7 @@ pub(super) fn fetch_files(
     mut streams: ResMut<Streams>,
 ) {
     let _span = debug_span!("gs4d/stream").entered();
-    let now = streams.began.elapsed().as_secs_f64();
+    let now = streams.pass_time();
     // The Gaussians of files were on the device only.
     let is_device_new = device.is_some_and(|device| device.is_changed());
     let mut wanted: BTreeMap<AssetId<GaussianCapture>, (Vec<Playhead>, Sight)> = BTreeMap::new();
