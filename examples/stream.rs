@@ -49,7 +49,7 @@ use bevy::core_pipeline::tonemapping::{DebandDither, Tonemapping};
 use bevy::prelude::*;
 use bevy::window::PrimaryWindow;
 use bevy_gs4d::prelude::*;
-use bevy_gs4d::stream::{CapturePart, StreamBudget};
+use bevy_gs4d::stream::StreamBudget;
 use bevy_gs4d::testing;
 use common::{Orbit, asset_path, save_pictures};
 use compare::{compare, views};
@@ -95,7 +95,7 @@ fn scene(app: &mut App, orbit: Orbit, budget: StreamBudget) {
     app.world_mut().spawn((Camera3d::default(), Msaa::Off, Tonemapping::None, DebandDither::Disabled, orbit));
 }
 
-fn keys(keys: Res<ButtonInput<KeyCode>>, mut playback: Single<&mut Playback, Without<CapturePart>>) {
+fn keys(keys: Res<ButtonInput<KeyCode>>, mut playback: Single<&mut Playback>) {
     if keys.just_pressed(KeyCode::Space) {
         playback.toggle();
     }

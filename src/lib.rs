@@ -139,7 +139,6 @@
 //! | [`Upright`] | captures | the game; it requires [`UprightTurn`] |
 //! | [`Markers`](playback::Markers), [`FollowsClock`](playback::FollowsClock) | captures; `FollowsClock` also timelines | the game |
 //! | [`CaptureStreamSettings`](stream::CaptureStreamSettings), [`CaptureStreamState`](stream::CaptureStreamState) | captures in chunk files | the game; the plugins |
-//! | [`CapturePart`](stream::CapturePart) | children of captures in chunk files | the plugins |
 //! | [`CaptureSocket`](playback::CaptureSocket), [`SocketState`](playback::SocketState) | children of captures | the game; the first requires the second |
 //! | [`CaptureCollider`](playback::CaptureCollider), [`ColliderState`](playback::ColliderState) | children of captures | the game; the first requires the second |
 //! | [`PlaybackClock`](playback::PlaybackClock) | an entity of its own; timelines | the game; the plugins on timelines |

@@ -106,14 +106,23 @@ const DEBUG_VELOCITY: u32 = 5u;
 
 // Input of `activate` for one part of a capture.
 struct Activation {
-    // Number of Gaussians in this part, and first entry of this part in the list.
+    // Number of Gaussians in this part, or in its pages that are listed, and first entry of this part in the list.
     count: u32,
     first: u32,
     // FILTER_*
     filter_mode: u32,
     segment: u32,
+    // 1: the Gaussians are in pages; first entry of this part in the list of pages; number of segments.
+    paged: u32,
+    first_page: u32,
+    segments: u32,
+    padding: u32,
 }
 
+// Gaussians of a page.
+const PAGE: u32 = 256u;
+
+const FILTER_ALL: u32 = 0u;
 const FILTER_BITS: u32 = 1u;
 const FILTER_INTERVALS: u32 = 2u;
 

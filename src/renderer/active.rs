@@ -1,10 +1,11 @@
 //! The list of active Gaussians of one placed capture, common to all views that draw the capture.
 //!
 //! In: a capture with a temporal filter and a time. Out: the indices of the Gaussians that are active in the segment of
-//! that time, ascending, part by part. `activate` writes them only when the segment has changed.
+//! that time, ascending, part by part; of a capture in chunk files, in the order of the files. `activate` writes them only
+//! when the segment, or the files that are there, have changed.
 
-use super::capture::{Filter, GpuCapture, Prefix};
-use super::layout::{Activation, BLOCK, INSTANCE_STRIDE};
+use super::capture::{Filter, GpuCapture, PartListing, Prefix};
+use super::layout::{Activation, BLOCK, INSTANCE_STRIDE, PAGE};
 use super::pipelines::Renderer;
 use wgpu::BufferUsages;
 
@@ -12,10 +13,14 @@ use wgpu::BufferUsages;
 #[derive(Debug)]
 pub struct ActiveList {
     capture: u64,
-    /// Segment of the time prepared last; `recorded`: whether the list of this segment has been recorded.
-    segment: Option<u32>,
+    /// Segment of the time prepared last, and version of the pages; `recorded`: whether the list of them has been recorded.
+    prepared: Option<(u32, u64)>,
     recorded: bool,
+    /// What is listed of each part of a capture in chunk files.
+    listing: Vec<PartListing>,
     uniforms: wgpu::Buffer,
+    /// The pages that are listed, part after part.
+    pages: wgpu::Buffer,
     activate: wgpu::BindGroup,
     /// Bind group of the list, which `project` reads.
     pub(super) list: wgpu::BindGroup,
@@ -26,20 +31,25 @@ impl ActiveList {
     pub fn new(device: &wgpu::Device, renderer: &Renderer, capture: &GpuCapture) -> Option<Self> {
         let most = capture.filter.as_ref()?.most;
         let allocator = renderer.allocator(device);
-        let count = (capture.len().max(1) as u64).next_multiple_of(u64::from(BLOCK));
+        let count: u64 = capture.parts.iter().map(|part| u64::from(part.count)).sum();
+        let count = count.max(1).next_multiple_of(u64::from(BLOCK));
+        let pages = capture.pages.as_ref().map_or(1, |paged| u64::from(paged.count()));
         let parts = capture.parts.len().max(1) as u64;
         let uniforms = allocator.buffer("gs4d activations", parts * u64::from(INSTANCE_STRIDE), BufferUsages::UNIFORM);
         let list = allocator.buffer("gs4d active list", u64::from(most.max(1)) * 4, BufferUsages::STORAGE);
+        let pages = allocator.buffer("gs4d active pages", pages * 4, BufferUsages::STORAGE);
         let blocks = allocator.buffer("gs4d active blocks", count / u64::from(BLOCK) * 4, BufferUsages::STORAGE);
         let uniform = wgpu::BindingResource::Buffer(wgpu::BufferBinding {
             buffer: &uniforms,
             offset: 0,
             size: std::num::NonZeroU64::new(size_of::<Activation>() as u64),
         });
-        let resources = [uniform, list.as_entire_binding(), blocks.as_entire_binding()];
+        let of_list = [&list, &blocks, &pages].map(wgpu::Buffer::as_entire_binding);
+        let resources = [[uniform].as_slice(), &of_list].concat();
         let activate = allocator.bind_group("gs4d activate", &renderer.layouts.activate, &resources);
         let list = allocator.bind_group("gs4d active list", &renderer.layouts.active, &[list.as_entire_binding()]);
-        Some(Self { capture: capture.id, segment: None, recorded: false, uniforms, activate, list })
+        let (prepared, listing) = (None, Vec::new());
+        Some(Self { capture: capture.id, prepared, recorded: false, listing, uniforms, pages, activate, list })
     }
 
     /// Returns whether the list belongs to this upload of a capture. If not, create a new list.
@@ -52,15 +62,30 @@ impl ActiveList {
     pub fn prepare(&mut self, queue: &wgpu::Queue, capture: &GpuCapture, time: f32) -> bool {
         let Some(filter) = &capture.filter else { return false };
         let segment = filter.segment_of(time);
-        if self.segment != Some(segment) {
-            self.segment = Some(segment);
+        let wanted = (segment, capture.pages.as_ref().map_or(0, |paged| paged.version()));
+        if self.prepared != Some(wanted) {
+            self.prepared = Some(wanted);
             self.recorded = false;
-            let mut first = 0;
+            self.listing = capture.pages.as_ref().map(|paged| paged.listing(segment)).unwrap_or_default();
+            let pages: Vec<u32> = self.listing.iter().flat_map(|part| &part.pages).copied().collect();
+            queue.write_buffer(&self.pages, 0, bytemuck::cast_slice(&pages));
+            let (mut first, mut first_page) = (0, 0);
             for (index, part) in capture.parts.iter().enumerate() {
-                let activation = Activation { count: part.count, first, filter_mode: filter.mode, segment };
+                let listing = self.listing.get(index);
+                let activation = Activation {
+                    count: listing.map_or(part.count, listed_slots),
+                    first,
+                    filter_mode: filter.mode,
+                    segment,
+                    paged: u32::from(listing.is_some()),
+                    first_page,
+                    segments: filter.segments,
+                    padding: 0,
+                };
                 let at = index as u64 * u64::from(INSTANCE_STRIDE);
                 queue.write_buffer(&self.uniforms, at, bytemuck::bytes_of(&activation));
-                first += filter.count(index, segment, None);
+                first += self.count(filter, index, None);
+                first_page += listing.map_or(0, |listing| listing.pages.len() as u32);
             }
         }
         !self.recorded
@@ -77,7 +102,11 @@ impl ActiveList {
             .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("gs4d activate"), timestamp_writes: None });
         for (index, part) in capture.parts.iter().enumerate() {
             let Some(filter) = &part.filter else { continue };
-            let blocks = part.count.div_ceil(BLOCK);
+            let count = self.listing.get(index).map_or(part.count, listed_slots);
+            if count == 0 {
+                continue;
+            }
+            let blocks = count.div_ceil(BLOCK);
             pass.set_bind_group(0, &self.activate, &[index as u32 * INSTANCE_STRIDE]);
             pass.set_bind_group(1, filter, &[]);
             for (pipeline, blocks) in renderer.activate.iter().zip([blocks, 1, blocks]) {
@@ -89,12 +118,21 @@ impl ActiveList {
 
     /// Returns the number of active Gaussians of a part, or of those in a prefix.
     fn count(&self, filter: &Filter, part: usize, prefix: Option<usize>) -> u32 {
-        self.segment.map_or(0, |segment| filter.count(part, segment, prefix))
+        match (self.listing.get(part), self.prepared) {
+            (Some(listing), _) => listing.active,
+            (None, Some((segment, _))) => filter.count(part, segment, prefix),
+            (None, None) => 0,
+        }
     }
 }
 
-/// Returns the number of Gaussians of a part of a capture that its list has, or all without a list; of those in a prefix,
-/// if there is one.
+/// Returns the number of Gaussians that the pages of a part have room for.
+fn listed_slots(listing: &PartListing) -> u32 {
+    listing.pages.len() as u32 * PAGE
+}
+
+/// Returns the number of Gaussians of a part of a capture that its list has; without a list all, or none of a capture in
+/// chunk files. Of those in a prefix, if there is one.
 pub(super) fn listed_count(
     capture: &GpuCapture,
     part: usize,
@@ -104,6 +142,7 @@ pub(super) fn listed_count(
     let count = capture.parts[part].count;
     match (&capture.filter, active, prefix) {
         (Some(filter), Some(active), _) => active.count(filter, part, prefix.map(|(index, _)| index)),
+        _ if capture.pages.is_some() => 0,
         (_, _, None) => count,
         (_, _, Some((_, Prefix { end, .. }))) => {
             let first: usize = capture.parts[..part].iter().map(|part| part.count as usize).sum();
@@ -115,17 +154,17 @@ pub(super) fn listed_count(
 /// Returns the largest number of Gaussians of a capture that are drawn at any time.
 pub(super) fn most_drawn(capture: &GpuCapture, active: Option<&ActiveList>) -> usize {
     match (&capture.filter, active) {
-        (Some(filter), Some(_)) => filter.most as usize,
+        (Some(filter), active) if active.is_some() || capture.pages.is_some() => filter.most as usize,
         _ => capture.len(),
     }
 }
 
 /// Returns the number of Gaussians by which the sizes of bins are chosen: the largest number at any time of a capture with other Gaussians at other
-/// times, as the frames of a sequence, otherwise all.
+/// times, as the frames of a sequence, otherwise all, also those of chunk files that are not there.
 pub(super) fn most_at_once(capture: &GpuCapture, active: Option<&ActiveList>) -> usize {
     if capture.filter.as_ref().is_some_and(|filter| filter.is_window) {
         most_drawn(capture, active)
     } else {
-        capture.len()
+        capture.pages.as_ref().map_or(capture.len(), |paged| paged.all() as usize)
     }
 }

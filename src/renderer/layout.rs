@@ -2,6 +2,7 @@
 //!
 //! In: views and settings. Out: plain data for uniform and storage buffers.
 
+use crate::scene::{ChunkTable, packed};
 use crate::view::{Appearance, BlendSpace, DebugView, Lighting, View};
 use bytemuck::{Pod, Zeroable};
 
@@ -165,7 +166,7 @@ pub const LIGHTING_LINEAR: u32 = 2;
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct Activation {
-    /// Gaussians in this part.
+    /// Gaussians in this part, or in its pages that are listed.
     pub count: u32,
     /// First entry of this part in the list.
     pub first: u32,
@@ -173,6 +174,14 @@ pub struct Activation {
     pub filter_mode: u32,
     /// Segment of the time that is drawn.
     pub segment: u32,
+    /// 1: the Gaussians are in pages.
+    pub paged: u32,
+    /// First entry of this part in the list of pages.
+    pub first_page: u32,
+    /// Number of segments.
+    pub segments: u32,
+    /// Unused.
+    pub padding: u32,
 }
 
 impl InstanceUniforms {
@@ -290,6 +299,12 @@ pub const DEBUG_LIFESPAN: u32 = 4;
 /// Debug view of velocities.
 pub const DEBUG_VELOCITY: u32 = 5;
 
+/// Gaussians of a page of a capture in chunk files: as in the table of the files, and as many as in a block of the packed form.
+pub const PAGE: u32 = ChunkTable::PAGE as u32;
+const _: () = assert!(PAGE as usize == packed::BLOCK, "the ranges of a block are those of a page");
+
+/// No filter: all Gaussians of the pages that are listed.
+pub const FILTER_ALL: u32 = 0;
 /// A filter of one bit for each Gaussian and segment.
 pub const FILTER_BITS: u32 = 1;
 /// A filter of one interval of segments for each Gaussian.

@@ -33,7 +33,7 @@ impl Layouts {
             new("gs4d pixel", &[Uniform(FRAME), Read, opaque, targets[0], targets[1]])
         };
         Self {
-            activate: new("gs4d activate", &[UniformAt(size_of::<layout::Activation>()), Write, Write]),
+            activate: new("gs4d activate", &[UniformAt(size_of::<layout::Activation>()), Write, Write, Read]),
             filter: new("gs4d filter", &[Read]),
             active: new("gs4d active list", &[Read]),
             captures: Storage::ALL.map(|storage| {

@@ -63,7 +63,7 @@ pub(crate) mod view;
 mod wgsl;
 
 pub use active::ActiveList;
-pub use capture::{CaptureUpload, GpuCapture};
+pub use capture::{CaptureUpload, ChunkFiles, FileUpload, GpuCapture};
 pub use device::{GpuContext, GpuError, WorkCounters, silence_wayland};
 pub use frame::{Design, Instance, OpaqueDepth, ViewParameters};
 pub(crate) use global_sort::FinishedFrame;

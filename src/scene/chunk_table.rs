@@ -59,6 +59,8 @@ impl ChunkTable {
     pub const MOST_LAYERS: u32 = 16;
     /// Most bytes of a Gaussian on the GPU: more than those of any form, with a temporal filter of any size.
     pub const MOST_GAUSSIAN_BYTES: u32 = 1 << 14;
+    /// Gaussians of a page, the unit of memory on the GPU: a block of the packed form.
+    pub const PAGE: u64 = 256;
 
     /// Returns the name of a chunk file. `number` counts from 0.
     pub fn file_name(number: usize, of: usize) -> String {
@@ -68,6 +70,13 @@ impl ChunkTable {
     /// Returns the bytes of a file's Gaussians on the GPU. `file` counts from 0; 0 for a file that is not there.
     pub fn gpu_bytes(&self, file: usize) -> u64 {
         self.files.get(file).map_or(0, |file| file.gaussians.saturating_mul(self.gaussian_bytes.into()))
+    }
+
+    /// Returns the bytes of a file on the GPU in whole [pages](Self::PAGE). `file` counts from 0; 0 for a file that is
+    /// not there.
+    pub fn page_bytes(&self, file: usize) -> u64 {
+        let pages = self.files.get(file).map_or(0, |file| file.gaussians.div_ceil(Self::PAGE));
+        pages.saturating_mul(Self::PAGE).saturating_mul(self.gaussian_bytes.into())
     }
 
     /// Returns the number of layers.
@@ -161,6 +170,18 @@ mod tests {
         assert_eq!([0, 1, 9].map(|layer| table.bytes_up_to(layer)), [2000, 3000, 3000], "two files of layer 0, three");
         let at = |stretch| [0, 1].map(|layer| table.bytes_at(stretch, layer));
         assert_eq!([0, 1, 2, 4].map(at), [[1000, 2000], [0, 1000], [1000, 2000], [0, 0]], "of a stretch");
+    }
+
+    #[test]
+    fn pages_are_whole() {
+        let table = |gaussians| {
+            let file = ChunkFile { stretches: [0, 0], layer: 0, gaussians, bytes: 0 };
+            ChunkTable { stretches: 1, gaussian_bytes: 80, files: vec![file] }
+        };
+        let pages = |gaussians| table(gaussians).page_bytes(0) / (80 * ChunkTable::PAGE);
+        assert_eq!([0, 1, 255, 256, 257, 512, 513].map(pages), [0, 1, 1, 1, 2, 2, 3], "256 Gaussians to a page");
+        assert_eq!(table(257).page_bytes(0), 512 * 80, "bytes");
+        assert_eq!((table(u64::MAX).page_bytes(0), table(1).page_bytes(1)), (u64::MAX, 0), "saturated, and no file");
     }
 
     #[test]

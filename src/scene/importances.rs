@@ -39,6 +39,20 @@ impl Importances {
         Self(sample)
     }
 
+    /// Returns the importances of the Gaussians of several captures together, each with its number of Gaussians.
+    pub fn of_all<'a>(captures: impl Iterator<Item = (usize, &'a Self)> + Clone) -> Self {
+        let all: usize = captures.clone().map(|(count, _)| count).sum();
+        let mut sample = Vec::with_capacity(all.min(SAMPLE));
+        for (count, Self(own)) in captures {
+            // At least one of each, and as many as there are.
+            let share = (count as u64 * SAMPLE as u64).div_ceil(all.max(1) as u64) as usize;
+            let share = share.min(own.len());
+            sample.extend((0..share).map(|step| own[(2 * step + 1) * own.len() / (2 * share)]));
+        }
+        sample.sort_unstable_by(|a, b| b.total_cmp(a));
+        Self(sample)
+    }
+
     /// Returns the share of the Gaussians that are more important than `least`, from 0 to 1.
     pub fn share_above(&self, least: f32) -> f32 {
         let Self(sample) = self;
@@ -112,6 +126,25 @@ mod tests {
         assert!((a / b - 1.0).abs() < 0.05, "{a} and {b} are the medians");
         let none = Importances::default();
         assert_eq!((none.least_of(0.5), none.share_above(0.0)), (0.0, 0.0), "an empty capture");
+    }
+
+    #[test]
+    fn importances_of_several_captures_are_those_of_all_gaussians() {
+        let all = scene(9000);
+        let gaussians: Vec<_> = all.iter().collect();
+        let of = |range: std::ops::Range<usize>| {
+            let own = gaussians[range].to_vec();
+            (own.len(), Importances::of(&RuntimeScene::sliced(own, Default::default())))
+        };
+        let parts = [of(0..200), of(200..6000), of(6000..9000), (0, Importances::default())];
+        let together = Importances::of_all(parts.iter().map(|(count, importances)| (*count, importances)));
+        assert!((SAMPLE..SAMPLE + 4).contains(&together.0.len()), "a sample of {}", together.0.len());
+        let alone = Importances::of(&all);
+        for share in [0.05, 0.3, 0.5, 0.9] {
+            let found = together.share_above(alone.least_of(share) * Thinning::FULL);
+            assert!((found - share).abs() < 0.02, "{found} of the Gaussians, expected {share}");
+        }
+        assert_eq!(Importances::of_all(std::iter::empty()), Importances::default(), "of none");
     }
 
     #[test]

@@ -61,7 +61,6 @@ fn reflected() -> Vec<(String, &'static str)> {
         bevy_gs4d::stereo::Eye,
         bevy_gs4d::stereo::SideBySide,
         bevy_gs4d::stereo::StereoRig,
-        bevy_gs4d::stream::CapturePart,
         bevy_gs4d::stream::CaptureStreamSettings,
         bevy_gs4d::stream::CaptureStreamState,
         bevy_gs4d::stream::OnUnderrun,

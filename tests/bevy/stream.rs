@@ -3,8 +3,9 @@
 //! In: a synthetic capture that `gs4d split` has cut, from an asset source whose reads the tests let through, fail and
 //! count. Out: proof that a capture is ready with its coarse picture and then becomes whole, that its settings decide
 //! what is drawn while files are missing, that budgets are kept, that files are loaded again after failures and
-//! reloads, that faults are reported, that the entities of files follow that of the capture, and that a whole stream
-//! has the picture of the joined capture, also after the loss of a device. Only the last two need a GPU.
+//! reloads, that faults are reported, and that a whole stream has the picture of the joined capture: on several
+//! entities, with any settings, in pages that other files were in before, after the loss of a device. Only the tests of
+//! pictures need a GPU.
 
 use crate::support::event_log::{Observed, debug, record, take_events};
 use crate::support::fixtures::synthetic_eye;
@@ -24,9 +25,10 @@ use bevy_gs4d::prelude::*;
 use bevy_gs4d::render::CaptureSettings;
 use bevy_gs4d::scene::ChunkTable;
 use bevy_gs4d::stream::{
-    CaptureBuffered, CaptureBuffering, CapturePart, CaptureStalled, CaptureStreamSettings, CaptureStreamState,
-    OnUnderrun, StreamBudget,
+    CaptureBuffered, CaptureBuffering, CaptureStalled, CaptureStreamSettings, CaptureStreamState, OnUnderrun,
+    StreamBudget,
 };
+use bevy_gs4d::testing;
 use image::{Rgba, RgbaImage};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsString;
@@ -35,6 +37,7 @@ use std::path::Path;
 use std::process::Command;
 use std::sync::{Arc, LazyLock};
 use std::time::Duration;
+use tempfile::TempDir;
 
 /// Duration of the capture.
 const SECONDS: f32 = 4.0;
@@ -42,6 +45,8 @@ const SECONDS: f32 = 4.0;
 const LATE: f32 = 3.6;
 /// The path of the index in apps without a renderer.
 const INDEX: &str = "gated://index.gs4d";
+/// The name of the file of the joined capture.
+const JOINED: &str = "joined.gs4d";
 
 /// A capture in chunk files.
 struct Split {
@@ -109,9 +114,9 @@ fn coarse(seconds: f32) -> BTreeSet<usize> {
     needed(seconds).into_iter().filter(|file| SPLIT.table.files[*file].layer == 0).collect()
 }
 
-/// Returns the bytes of the Gaussians of files on the GPU.
+/// Returns the bytes of the pages of files on the GPU.
 fn gpu_bytes(files: &BTreeSet<usize>) -> u64 {
-    files.iter().map(|file| SPLIT.table.gpu_bytes(*file)).sum()
+    files.iter().map(|file| SPLIT.table.page_bytes(*file)).sum()
 }
 
 fn name(file: usize) -> String {
@@ -198,34 +203,15 @@ fn table(app: &App, entity: Entity) -> Option<Arc<ChunkTable>> {
     captures(app).get(&get::<GaussianCapture3d>(app, entity).0)?.scene().chunks.clone()
 }
 
-/// Returns the number of parts in the world.
-fn count_parts(app: &App) -> usize {
-    app.world().try_query::<&CapturePart>().map_or(0, |mut parts| parts.iter(app.world()).count())
+/// Returns the time that is drawn of a stream, and the number of files of the playback's time that are there.
+fn shown(app: &App, entity: Entity) -> (Option<f32>, usize) {
+    let state = stream(app, entity);
+    (state.seconds, state.resident)
 }
 
-/// Returns the parts of an entity.
-fn children(app: &App, entity: Entity) -> Vec<Entity> {
-    let children = app.world().get::<Children>(entity).into_iter().flatten().copied();
-    children.filter(|child| app.world().get::<CapturePart>(*child).is_some()).collect()
-}
-
-/// Returns the parts of an entity: the numbers of their files, ascending, with the times of their playback.
-fn parts(app: &App, entity: Entity) -> Vec<(usize, f32)> {
-    let server = app.world().resource::<AssetServer>();
-    let part = |child: Entity| {
-        let file = get::<CapturePart>(app, child).file as usize;
-        let path = server.get_path(get::<GaussianCapture3d>(app, child).0.id()).map(|path| path.to_string());
-        assert_eq!(path, Some(format!("gated://{}", name(file))), "part {file} has the file of this number");
-        (file, time(app, child))
-    };
-    let mut parts: Vec<(usize, f32)> = children(app, entity).into_iter().map(part).collect();
-    parts.sort_by_key(|(file, _)| *file);
-    parts
-}
-
-/// Returns parts of these files at a time.
-fn drawn(files: BTreeSet<usize>, seconds: f32) -> Vec<(usize, f32)> {
-    files.into_iter().map(|file| (file, seconds)).collect()
+/// Returns what [`shown`] returns of a stream with all files of a time, which is drawn.
+fn all_of(seconds: f32) -> (Option<f32>, usize) {
+    (Some(seconds), needed(seconds).len())
 }
 
 /// Returns the events since the last call whose names begin in this way.
@@ -256,7 +242,7 @@ fn a_capture_is_ready_once_its_coarse_picture_is_there_and_then_becomes_whole() 
         pass(&mut stage.app, 0.0);
         let state = stream(&stage.app, entity);
         assert_eq!(get::<CaptureState>(&stage.app, entity), CaptureState::Loading, "without one file: {state:?}");
-        assert_eq!((state.seconds, state.is_coarse, count_parts(&stage.app)), (None, false, 0), "nothing is drawn");
+        assert_eq!((state.seconds, state.is_coarse), (None, false), "nothing is drawn");
     }
     assert_eq!(events(&mut stage.app, "CaptureReady"), [""; 0], "nothing is ready");
 
@@ -266,20 +252,19 @@ fn a_capture_is_ready_once_its_coarse_picture_is_there_and_then_becomes_whole() 
     assert_eq!((state.seconds, state.is_coarse, state.is_whole()), (Some(0.0), true, false), "coarse: {state:?}");
     assert_eq!((state.needed, state.resident), (needed(0.0).len(), count), "the files of layer 0: {state:?}");
     assert!(state.share > 0.0 && state.share < 1.0, "a share of the Gaussians: {state:?}");
-    assert_eq!(parts(&stage.app, entity), drawn(coarse(0.0), 0.0), "their parts");
     let ready = debug(&CaptureReady { entity, capture: get::<GaussianCapture3d>(&stage.app, entity).0.id() });
     let said = events(&mut stage.app, "CaptureReady").into_iter().filter(|event| *event == ready).count();
     assert_eq!(said, 1, "one message names the entity of the game");
 
     stage.gate.open();
     until(&mut stage.app, "a whole picture", |app| stream(app, entity).is_whole());
-    assert_eq!(parts(&stage.app, entity), drawn(needed(0.0), 0.0), "a part for each file of the first moment");
+    assert_eq!(shown(&stage.app, entity), all_of(0.0), "each file of the first moment");
     assert_eq!(stream(&stage.app, entity).share, 1.0, "all Gaussians");
     assert_eq!(events(&mut stage.app, &ready), [""; 0], "the capture is ready once");
 }
 
 #[test]
-fn parts_are_those_of_the_time_and_have_the_time_of_their_parent() {
+fn a_playing_stream_has_the_files_of_its_time_and_draws_that_time() {
     let mut stage = Stage::new();
     let entity = stage.whole();
     let count = SPLIT.table.files.len() + 1;
@@ -292,16 +277,30 @@ fn parts_are_those_of_the_time_and_have_the_time_of_their_parent() {
         turns += usize::from(now < before);
         let state = stream(&stage.app, entity);
         assert!(state.is_whole() && state.seconds == Some(now), "everything is there at {now} s: {state:?}");
-        assert_eq!(parts(&stage.app, entity), drawn(needed(now), now), "parts at {now} s");
-        assert_eq!(count_parts(&stage.app), needed(now).len(), "and no others");
+        assert_eq!(shown(&stage.app, entity), all_of(now), "the files of {now} s");
     }
     assert_eq!(turns, 1, "the capture loops");
     seek(&mut stage.app, entity, LATE);
     pass(&mut stage.app, 0.0);
-    assert_eq!(parts(&stage.app, entity), drawn(needed(LATE), LATE), "parts after a jump, in the same frame");
+    assert_eq!(shown(&stage.app, entity), all_of(LATE), "the files after a jump, in the same frame");
     let played = events(&mut stage.app, "Playback");
-    let of_parent = |event: &String| event.contains(&format!("entity: {entity:?}"));
-    assert!(played.len() >= 3 && played.iter().all(of_parent), "no message about playing names a part: {played:?}");
+    let of_entity = |event: &String| event.contains(&format!("entity: {entity:?}"));
+    assert!(played.len() >= 3 && played.iter().all(of_entity), "no other entity plays: {played:?}");
+    assert!(stage.app.world().get::<Children>(entity).is_none(), "the entity itself is drawn: it has no children");
+}
+
+#[test]
+fn the_files_that_are_read_are_those_of_the_time() {
+    let mut stage = Stage::new();
+    stage.gate.open();
+    stage.app.insert_resource(StreamBudget { ahead_seconds: 0.0, ..default() });
+    let entity = stage.spawn(Playback::paused_at(LATE));
+    until(&mut stage.app, "a whole picture", |app| stream(app, entity).is_whole());
+    rest(&mut stage.app);
+    assert_eq!(shown(&stage.app, entity), all_of(LATE), "the files of {LATE} s");
+    let once: BTreeMap<String, usize> =
+        names(needed(LATE)).chain([ChunkTable::INDEX.to_owned()]).map(|name| (name, 1)).collect();
+    assert_eq!(stage.gate.reads(), once, "the index and these files, by their names, and no others");
 }
 
 #[test]
@@ -315,7 +314,7 @@ fn no_time_passes_before_the_first_picture() {
         pass(&mut stage.app, 0.25);
     }
     assert_eq!(time(&stage.app, entity), 0.0, "playback waits at its beginning");
-    assert_eq!((stream(&stage.app, entity).seconds, count_parts(&stage.app)), (None, 0), "nothing is drawn");
+    assert_eq!(stream(&stage.app, entity).seconds, None, "nothing is drawn");
     let buffering = debug(&CaptureBuffering { entity, seconds: 0.0 });
     assert_eq!(said(&mut stage.app), [buffering], "it buffers, and has nothing to stall");
     stage.gate.open();
@@ -352,13 +351,11 @@ fn settings_decide_what_is_drawn_while_the_most_important_gaussians_are_missing(
         expected.extend(stalls.then(|| debug(&CaptureStalled { entity, seconds: then })));
         assert_eq!(said(app), expected, "{on_underrun:?}: each message once");
         assert_eq!((state.is_coarse, now > then), (false, !stalls), "{on_underrun:?}: {then} s to {now} s, {state:?}");
-        let (seconds, files) = match on_underrun {
-            OnUnderrun::Coarse => (now, &coarse(0.0) & &needed(now)),
-            _ => (0.0, coarse(0.0)),
-        };
+        let seconds = if on_underrun == OnUnderrun::Coarse { now } else { 0.0 };
         assert_eq!(state.seconds, Some(seconds), "{on_underrun:?}: the time that is drawn");
-        assert!(!files.is_empty(), "{on_underrun:?}: something is drawn");
-        assert_eq!(parts(app, entity), drawn(files, seconds), "{on_underrun:?}: the parts that are drawn");
+        let there = (&coarse(0.0) & &needed(now)).len();
+        assert!(there > 0, "{on_underrun:?}: files of both times are there");
+        assert_eq!(state.resident, there, "{on_underrun:?}: the files of the playback's time that are there");
 
         stage.gate.open();
         until(app, "a coarse picture", |app| stream(app, entity).is_coarse);
@@ -367,7 +364,7 @@ fn settings_decide_what_is_drawn_while_the_most_important_gaussians_are_missing(
         pass(app, 0.02);
         let later = time(app, entity);
         assert!(later > now, "{on_underrun:?}: time passes");
-        assert!(parts(app, entity).iter().all(|(_, part)| *part == later), "{on_underrun:?}: the parts have that time");
+        assert_eq!(stream(app, entity).seconds, Some(later), "{on_underrun:?}: the picture has that time");
     }
 }
 
@@ -501,8 +498,8 @@ fn a_file_with_more_gaussians_than_its_index_says_is_not_drawn() {
     until(&mut stage.app, "the other files", |app| stream(app, entity).resident >= others);
     rest(&mut stage.app);
     let state = stream(&stage.app, entity);
-    assert!(!state.is_coarse && state.seconds.is_none(), "the file does not count as there: {state:?}");
-    assert_eq!(count_parts(&stage.app), 0, "nothing is drawn");
+    assert!(!state.is_coarse, "the file does not count as there: {state:?}");
+    assert_eq!(state.seconds, None, "nothing is drawn: {state:?}");
 }
 
 #[test]
@@ -519,15 +516,14 @@ fn a_file_that_lands_after_its_capture_was_removed_is_ignored() {
     for _ in 0..50 {
         std::thread::sleep(Duration::from_millis(2));
         pass(&mut stage.app, 0.0);
-        assert_eq!((captures(&stage.app).len(), count_parts(&stage.app)), (0, 0), "nothing is loaded, nothing drawn");
+        assert_eq!(captures(&stage.app).len(), 0, "nothing is loaded");
     }
     let again = stage.whole();
-    assert_eq!(parts(&stage.app, again), drawn(needed(0.0), 0.0), "another entity has its parts");
+    assert_eq!(shown(&stage.app, again), all_of(0.0), "another entity has all files of its time");
     pass(&mut stage.app, 0.25);
     assert_eq!(time(&stage.app, again), 0.25, "it plays");
     stage.app.world_mut().despawn(again);
     until(&mut stage.app, "all files are dropped", |app| captures(app).is_empty());
-    assert_eq!(count_parts(&stage.app), 0, "parts are despawned with their parent");
 }
 
 #[test]
@@ -541,16 +537,15 @@ fn two_entities_of_one_capture_share_its_files() {
         entities.iter().all(|entity| stream(app, *entity).is_whole()) && captures(app).len() == count
     });
     for (entity, seconds) in entities.into_iter().zip(times) {
-        assert_eq!(parts(&stage.app, entity), drawn(needed(seconds), seconds), "the parts of {seconds} s");
-        assert_eq!(stream(&stage.app, entity).seconds, Some(seconds), "its own time");
+        assert_eq!(shown(&stage.app, entity), all_of(seconds), "its own time, {seconds} s");
     }
     seek(&mut stage.app, entities[1], 1.7);
     pass(&mut stage.app, 0.0);
-    assert_eq!(parts(&stage.app, entities[0]), drawn(needed(0.2), 0.2), "the first stays");
-    assert_eq!(parts(&stage.app, entities[1]), drawn(needed(1.7), 1.7), "the second has jumped");
+    assert_eq!(shown(&stage.app, entities[0]), all_of(0.2), "the first stays");
+    assert_eq!(shown(&stage.app, entities[1]), all_of(1.7), "the second has jumped");
     stage.app.world_mut().despawn(entities[0]);
     pass(&mut stage.app, 0.0);
-    assert_eq!(parts(&stage.app, entities[1]), drawn(needed(1.7), 1.7), "the second stays");
+    assert_eq!(shown(&stage.app, entities[1]), all_of(1.7), "the second stays");
     let once: BTreeMap<String, usize> = SPLIT.files.keys().map(|name| (name.clone(), 1)).collect();
     assert_eq!(stage.gate.reads(), once, "each file is read once");
 }
@@ -581,7 +576,7 @@ fn a_file_that_cannot_be_read_is_tried_again() {
     pass(&mut stage.app, 0.0);
     assert_eq!(get::<CaptureState>(&stage.app, entity), CaptureState::Ready, "the capture is ready");
     assert_eq!(events(&mut stage.app, "CaptureFailed"), [""; 0], "and has not failed");
-    assert_eq!(parts(&stage.app, entity), drawn(needed(0.0), 0.0), "its parts");
+    assert_eq!(shown(&stage.app, entity), all_of(0.0), "all files of its time are there");
 }
 
 #[test]
@@ -595,7 +590,7 @@ fn a_capture_whose_index_is_loaded_again_becomes_whole_again() {
     until(&mut stage.app, "the index", |app| table(app, entity).is_some_and(|table| !Arc::ptr_eq(&table, &before)));
     stage.gate.open();
     until(&mut stage.app, "a whole picture", |app| stream(app, entity).is_whole());
-    assert_eq!(parts(&stage.app, entity), drawn(needed(0.0), 0.0), "the parts");
+    assert_eq!(shown(&stage.app, entity), all_of(0.0), "all files of its time are there");
     let reads = stage.gate.reads();
     for file in coarse(0.0) {
         assert_eq!(reads.get(&name(file)), Some(&2), "file {file} is read again: it may have changed with the index");
@@ -612,7 +607,6 @@ fn a_stream_ends_with_its_component() {
     let entity = stage.whole();
     stage.app.world_mut().entity_mut(entity).remove::<GaussianCapture3d>();
     pass(&mut stage.app, 0.0);
-    assert_eq!(count_parts(&stage.app), 0, "no parts");
     assert!(stage.app.world().get::<CaptureStreamState>(entity).is_none(), "no state");
     until(&mut stage.app, "all files are dropped", |app| captures(app).is_empty());
 }
@@ -631,12 +625,12 @@ fn a_stream_ends_with_another_capture() {
         pass(app, 0.02);
     }
     let stalled = time(app, entity);
-    assert!(count_parts(app) > 0 && !stream(app, entity).is_coarse, "it stalls at {stalled} s");
+    let state = stream(app, entity);
+    assert_eq!((state.seconds, state.is_coarse), (Some(0.0), false), "it stalls at {stalled} s: {state:?}");
 
     let other = playback_app::capture(app, 8.0, 4);
     app.world_mut().entity_mut(entity).insert(GaussianCapture3d(other));
     pass(app, 0.0);
-    assert_eq!(count_parts(app), 0, "no parts");
     assert!(app.world().get::<CaptureStreamState>(entity).is_none(), "no state");
     until(app, "the files are dropped", |app| captures(app).len() == 2);
     assert_eq!(get::<CaptureState>(app, entity), CaptureState::Ready, "the other capture is ready");
@@ -647,71 +641,28 @@ fn a_stream_ends_with_another_capture() {
     app.world_mut().entity_mut(entity).insert(GaussianCapture3d(index));
     until(app, "the stream again", |app| stream(app, entity).is_whole());
     let now = time(app, entity);
-    assert_eq!(parts(app, entity), drawn(needed(now), now), "the parts of {now} s");
-}
-
-type Looks = (Option<CaptureSettings>, Option<RenderLayers>, Option<ClipFade>);
-
-/// Checks that each part of an entity has these components.
-fn check_looks(app: &App, entity: Entity, (settings, layers, fade): &Looks, what: &str) {
-    let parts = children(app, entity);
-    assert!(!parts.is_empty(), "{what}: there are parts");
-    for part in parts {
-        let world = app.world();
-        assert_eq!(world.get::<CaptureSettings>(part).copied(), *settings, "{what}: the settings");
-        assert_eq!(world.get::<RenderLayers>(part), layers.as_ref(), "{what}: the layers");
-        assert_eq!(world.get::<ClipFade>(part).copied(), *fade, "{what}: the fade");
-    }
+    assert_eq!(shown(app, entity), all_of(now), "all files of {now} s");
 }
 
 #[test]
-fn parts_take_over_the_settings_of_their_parent() {
-    let mut stage = Stage::new();
-    let entity = stage.whole();
+fn rays_do_not_hit_a_capture_in_chunk_files() {
+    let mut files = SPLIT.files.clone();
+    files.insert(JOINED.to_owned(), SPLIT.joined.clone());
+    let mut stage = Stage::of(&files);
+    let streamed = stage.whole();
     let app = &mut stage.app;
-    let count = SPLIT.table.files.len() + 1;
-    until(app, "all files", |app| captures(app).len() == count);
-    check_looks(app, entity, &(Some(CaptureSettings::default()), None, None), "as they were spawned");
-    let (settings, layers, fade) =
-        (CaptureSettings { opacity: 0.5, ..default() }, RenderLayers::layer(3), ClipFade(0.25));
-    app.world_mut().entity_mut(entity).insert((settings, layers.clone(), fade));
-    pass(app, 0.0);
-    let all = (Some(settings), Some(layers.clone()), Some(fade));
-    check_looks(app, entity, &all, "in the frame of the change");
-    let before: BTreeSet<Entity> = children(app, entity).into_iter().collect();
-    seek(app, entity, LATE);
-    pass(app, 0.0);
-    check_looks(app, entity, &all, "after a jump");
-    assert!(children(app, entity).iter().any(|part| !before.contains(part)), "some of the parts are new");
-    change::<CaptureSettings>(app, entity, |settings| settings.opacity = 1.0);
-    app.world_mut().entity_mut(entity).remove::<(RenderLayers, ClipFade)>();
-    pass(app, 0.0);
-    check_looks(app, entity, &(Some(CaptureSettings::default()), None, None), "without them");
-}
-
-#[test]
-fn rays_do_not_hit_parts() {
-    let mut stage = Stage::new();
-    let entity = stage.whole();
-    let app = &mut stage.app;
-    let parts = children(app, entity);
-    let handles: Vec<GaussianCapture3d> = parts.iter().map(|part| get::<GaussianCapture3d>(app, *part)).collect();
+    let joined: Handle<GaussianCapture> = app.world().resource::<AssetServer>().load(format!("gated://{JOINED}"));
+    let whole = app.world_mut().spawn((GaussianCapture3d(joined.clone()), Playback::paused_at(0.0))).id();
+    until(app, "the joined capture", |app| captures(app).contains(&joined));
+    let capture = captures(app).get(&joined).expect("the joined capture is loaded");
+    let means = capture.scene().iter().map(|gaussian| gaussian.mean_at(capture.time_at(0.0)));
     // Along -z through each Gaussian.
-    let through = |capture: &GaussianCapture| {
-        let means = capture.scene().iter().map(|gaussian| gaussian.mean_at(capture.time_at(0.0)));
-        means.map(|mean| Ray3d::new(mean + Vec3::Z, Dir3::NEG_Z)).collect::<Vec<Ray3d>>()
-    };
-    let loaded = handles.iter().filter_map(|handle| captures(app).get(&handle.0));
-    let rays: Vec<Ray3d> = loaded.flat_map(through).collect();
-    // The same files on entities of the game.
-    let place = |handle: GaussianCapture3d| app.world_mut().spawn((handle, Playback::paused_at(0.0))).id();
-    let others: Vec<Entity> = handles.into_iter().map(place).collect();
+    let rays: Vec<Ray3d> = means.map(|mean| Ray3d::new(mean + Vec3::Z, Dir3::NEG_Z)).collect();
     let are_hit = move |picker: CapturePicker| {
-        let is_hit = |entity: &Entity| rays.iter().any(|ray| picker.cast_on(*entity, *ray).is_some());
-        [&parts, &others].map(|entities| entities.iter().any(is_hit))
+        [streamed, whole].map(|entity| rays.iter().any(|ray| picker.cast_on(entity, *ray).is_some()))
     };
     let found = app.world_mut().run_system_once(are_hit).expect("the system runs");
-    assert_eq!(found, [false, true], "no part is hit, and entities of the game are");
+    assert_eq!(found, [false, true], "the streamed entity is not hit, and the joined capture is");
 }
 
 #[test]
@@ -727,43 +678,80 @@ fn a_stream_follows_a_clock() {
         state.is_whole() && state.seconds == Some(seconds)
     };
     until(&mut stage.app, "the time of the clock", |app| is_at(app, 1.25));
-    assert_eq!(parts(&stage.app, entity), drawn(needed(1.25), 1.25), "the parts of that time");
+    assert_eq!(shown(&stage.app, entity), all_of(1.25), "all files of that time");
     change::<PlaybackClock>(&mut stage.app, clock, |clock| clock.seek(3.125));
     pass(&mut stage.app, 0.25);
     assert_eq!(time(&stage.app, entity), 3.125, "it follows the jump at once");
     until(&mut stage.app, "the jump of the clock", |app| is_at(app, 3.125));
-    assert_eq!(parts(&stage.app, entity), drawn(needed(3.125), 3.125), "the parts after the jump");
+    assert_eq!(shown(&stage.app, entity), all_of(3.125), "all files after the jump");
 }
 
-#[test]
-fn parts_that_no_parent_knows_are_despawned() {
-    let mut stage = Stage::new();
-    let entity = stage.whole();
-    let world = stage.app.world_mut();
-    let other = world.spawn_empty().id();
-    let strays = [
-        world.spawn((CapturePart { file: 0 }, ChildOf(entity))).id(),
-        world.spawn((CapturePart { file: u32::MAX }, ChildOf(entity))).id(),
-        world.spawn((CapturePart { file: 0 }, ChildOf(other))).id(),
-        world.spawn(CapturePart { file: 0 }).id(),
-    ];
-    pass(&mut stage.app, 0.0);
-    let left = strays.map(|stray| stage.app.world().get_entity(stray).is_ok());
-    assert_eq!(left, [false; 4], "those of a stream, of another entity, and of none");
-    assert_eq!(parts(&stage.app, entity), drawn(needed(0.0), 0.0), "the parts of the stream stay");
+/// An app with a renderer and a camera, and the folder of a capture in chunk files, with the joined capture beside
+/// them.
+struct Studio {
+    app: App,
+    folder: TempDir,
 }
 
-/// Returns the pictures of an entity, paused at each of these times.
-fn pictures(app: &mut App, entity: Entity, times: [f32; 5], is_there: impl Fn(&App, f32) -> bool) -> Vec<RgbaImage> {
-    // The first makes the app ready for updates.
-    picture(app, 0.0);
-    let shot = |seconds: f32| {
-        seek(app, entity, seconds);
-        run_frames(app, 1);
-        wait_until(app, &format!("{seconds} s"), |app| is_there(app, seconds), |app| run_frames(app, 1));
-        picture(app, 0.0)
-    };
-    times.map(shot).into()
+impl Studio {
+    /// Returns a studio whose pictures are small; without a GPU, reports the skipped test and returns `None`.
+    fn of(split: &Split) -> Option<Self> {
+        let mut app = offscreen_app::app(UVec2::new(96, 72))?;
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let files = split.files.iter().map(|(name, bytes)| (name.as_str(), bytes));
+        for (name, bytes) in files.chain([(JOINED, &split.joined)]) {
+            fs::write(folder.path().join(name), bytes).expect("the folder can be written to");
+        }
+        spawn_camera(&mut app, Msaa::Off, synthetic_eye());
+        Some(Self { app, folder })
+    }
+
+    /// Spawns an entity with the capture of a file of the folder, paused at a time, and waits for its picture.
+    fn spawn(&mut self, file: &str, seconds: f32, bundle: impl Bundle) -> Entity {
+        let capture = self.app.world().resource::<AssetServer>().load(self.folder.path().join(file));
+        let player = (GaussianCapture3d(capture), Playback::paused_at(seconds), bundle);
+        let entity = self.app.world_mut().spawn(player).id();
+        testing::settle(&mut self.app).expect("the app draws without an error");
+        let is_streamed = self.app.world().get::<CaptureStreamState>(entity).is_some();
+        assert_eq!(is_streamed, file == ChunkTable::INDEX, "the capture of {file} is streamed, or is not");
+        entity
+    }
+
+    /// Seeks with these entities to these times, waits until each is drawn at its time with all Gaussians, and returns
+    /// the picture.
+    fn shot(&mut self, players: &[(Entity, f32)]) -> RgbaImage {
+        for (entity, seconds) in players {
+            seek(&mut self.app, *entity, *seconds);
+        }
+        run_frames(&mut self.app, 1);
+        let is_there = |app: &App| players.iter().all(|(entity, seconds)| is_drawn_at(app, *entity, *seconds));
+        wait_until(&mut self.app, &format!("all of {players:?}"), is_there, |app| run_frames(app, 1));
+        picture(&mut self.app, 0.0)
+    }
+
+    /// Returns the pictures of a capture of the folder, paused at each of these times, and removes it.
+    fn pictures(&mut self, file: &str, times: &[f32]) -> Vec<RgbaImage> {
+        let entity = self.spawn(file, 0.0, ());
+        let pictures = times.iter().map(|seconds| self.shot(&[(entity, *seconds)])).collect();
+        self.app.world_mut().despawn(entity);
+        pictures
+    }
+}
+
+/// Returns whether an entity is drawn at a time with all Gaussians. A capture that is not streamed is.
+fn is_drawn_at(app: &App, entity: Entity, seconds: f32) -> bool {
+    let state = app.world().get::<CaptureStreamState>(entity);
+    state.is_none_or(|state| state.is_whole() && state.seconds == Some(seconds))
+}
+
+/// Checks that a picture of a stream is that of the joined capture, bit for bit.
+fn check_picture(streamed: &RgbaImage, whole: &RgbaImage, what: &str) {
+    let bright = whole.pixels().filter(|pixel| pixel.0[..3].iter().any(|channel| *channel > 64)).count();
+    assert!(bright > 100, "{what}: the capture is visible: {bright} bright pixels");
+    let apart = |(a, b): (&Rgba<u8>, &Rgba<u8>)| a.0.iter().zip(b.0).map(|(a, b)| a.abs_diff(b)).max();
+    let apart: Vec<u8> = streamed.pixels().zip(whole.pixels()).filter_map(apart).filter(|by| *by > 0).collect();
+    let (count, most) = (apart.len(), apart.iter().max().copied().unwrap_or_default());
+    assert_eq!(count, 0, "{what}: {count} pixels differ, by at most {most} / 255");
 }
 
 #[test]
@@ -779,62 +767,123 @@ fn a_whole_stream_of_packed_files_has_the_picture_of_the_package() {
 
 /// Checks that a whole stream has the pictures of the joined capture.
 fn check_pictures(split: &Split) {
-    let Some(mut app) = offscreen_app::app(UVec2::new(96, 72)) else { return };
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let joined = folder.path().join("joined.gs4d");
-    fs::write(&joined, &split.joined).expect("the folder can be written to");
-    for (name, bytes) in &split.files {
-        fs::write(folder.path().join(name), bytes).expect("the folder can be written to");
-    }
-    spawn_camera(&mut app, Msaa::Off, synthetic_eye());
-    let spawn = |app: &mut App, path: &Path| {
-        let capture = app.world().resource::<AssetServer>().load(path.to_owned());
-        app.world_mut().spawn((GaussianCapture3d(capture), Playback::paused_at(0.0))).id()
-    };
+    let Some(mut studio) = Studio::of(split) else { return };
     // The beginning, the end, the boundary of two stretches, and two others.
     let times = [0.0, 1.3, 2.0, 2.77, SECONDS];
-    let entity = spawn(&mut app, &folder.path().join(ChunkTable::INDEX));
-    let streamed = pictures(&mut app, entity, times, |app, seconds| {
-        let state = stream(app, entity);
-        state.is_whole() && state.seconds == Some(seconds)
-    });
-    app.world_mut().despawn(entity);
-    let entity = spawn(&mut app, &joined);
-    let whole = pictures(&mut app, entity, times, |_, _| true);
+    let [streamed, whole] = [ChunkTable::INDEX, JOINED].map(|file| studio.pictures(file, &times));
     for ((seconds, streamed), whole) in times.into_iter().zip(&streamed).zip(&whole) {
-        let bright = whole.pixels().filter(|pixel| pixel.0[..3].iter().any(|channel| *channel > 64)).count();
-        assert!(bright > 300, "the capture is visible at {seconds} s: {bright} bright pixels");
-        let apart = |(a, b): (&Rgba<u8>, &Rgba<u8>)| a.0.iter().zip(b.0).map(|(a, b)| a.abs_diff(b)).max();
-        let apart: Vec<u8> = streamed.pixels().zip(whole.pixels()).filter_map(apart).filter(|by| *by > 0).collect();
-        let (count, most) = (apart.len(), apart.iter().max().copied().unwrap_or_default());
-        assert_eq!(count, 0, "{count} pixels differ at {seconds} s, by at most {most} / 255");
+        check_picture(streamed, whole, &format!("{seconds} s"));
     }
     assert_ne!(whole[0], whole[1], "the capture moves");
 }
 
 #[test]
-fn a_stream_is_loaded_again_after_its_device_was_lost() {
-    let Some(mut app) = offscreen_app::app(UVec2::new(96, 72)) else { return };
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    for (name, bytes) in &SPLIT.files {
-        fs::write(folder.path().join(name), bytes).expect("the folder can be written to");
+fn pages_are_used_again_within_a_small_budget() {
+    let Some(mut studio) = Studio::of(&SPLIT) else { return };
+    // In six stretches. At most of these times all Gaussians fill the budget.
+    let times = [0.2, LATE, 1.3, 2.77, 0.7, 3.2, 0.2, LATE];
+    let most = times.into_iter().map(|seconds| gpu_bytes(&needed(seconds))).max().expect("times");
+    let files: BTreeSet<usize> = times.into_iter().flat_map(needed).collect();
+    assert!(most < gpu_bytes(&files), "{most} bytes have no room for all files: {files:?}");
+    // Nothing is loaded ahead.
+    let budget = |gpu_bytes: u64| StreamBudget { gpu_bytes, ahead_seconds: 0.0, ..default() };
+    studio.app.insert_resource(budget(most));
+    let entity = studio.spawn(ChunkTable::INDEX, 0.0, ());
+    let mut streamed = Vec::new();
+    for (number, seconds) in times.into_iter().enumerate() {
+        streamed.push(studio.shot(&[(entity, seconds)]));
+        let state = stream(&studio.app, entity);
+        assert!(state.gpu_bytes <= most, "{seconds} s: the budget of {most} bytes is kept: {state:?}");
+        if number % 2 == 1 {
+            // With less room for a moment, the least important files are given up, too: most pages are written again.
+            let least = gpu_bytes(&coarse(seconds));
+            studio.app.insert_resource(budget(least));
+            run_frames(&mut studio.app, 1);
+            let state = stream(&studio.app, entity);
+            let is_coarse = state.is_coarse && !state.is_whole();
+            assert!(is_coarse && state.gpu_bytes <= least, "{seconds} s: the first layer stays: {state:?}, {least}");
+            studio.app.insert_resource(budget(most));
+        }
     }
-    spawn_camera(&mut app, Msaa::Off, synthetic_eye());
-    let index = app.world().resource::<AssetServer>().load(folder.path().join(ChunkTable::INDEX));
-    let entity = app.world_mut().spawn((GaussianCapture3d(index), Playback::paused_at(1.3))).id();
+    studio.app.world_mut().despawn(entity);
+    let whole = studio.pictures(JOINED, &times);
+    for ((number, seconds), (streamed, whole)) in times.into_iter().enumerate().zip(streamed.iter().zip(&whole)) {
+        check_picture(streamed, whole, &format!("jump {number}, to {seconds} s"));
+    }
+}
+
+#[test]
+fn entities_of_one_stream_show_their_own_times() {
+    let Some(mut studio) = Studio::of(&SPLIT) else { return };
+    let times = [[0.3, LATE], [LATE, 0.3], [LATE, LATE]];
+    let [streamed, whole] = [ChunkTable::INDEX, JOINED].map(|file| {
+        let entities = [-0.8, 0.8].map(|x| {
+            let place = Transform::from_xyz(x, 0.0, 0.0).with_scale(Vec3::splat(0.6));
+            studio.spawn(file, 0.0, place)
+        });
+        let [left, right] = entities;
+        let pictures = times.map(|[first, second]| studio.shot(&[(left, first), (right, second)]));
+        for entity in entities {
+            studio.app.world_mut().despawn(entity);
+        }
+        pictures
+    });
+    for ((times, streamed), whole) in times.iter().zip(&streamed).zip(&whole) {
+        check_picture(streamed, whole, &format!("at {times:?} s"));
+    }
+    assert!(whole[0] != whole[1] && whole[1] != whole[2], "each time has another picture");
+}
+
+#[test]
+fn a_streamed_capture_without_a_filter_setting_is_drawn_the_same() {
+    let Some(mut studio) = Studio::of(&SPLIT) else { return };
+    let entity = studio.spawn(ChunkTable::INDEX, 0.0, ());
+    let filtered = studio.shot(&[(entity, 1.3)]);
+    studio.app.world_mut().entity_mut(entity).insert(CaptureSettings { filter: false, ..default() });
+    let unfiltered = studio.shot(&[(entity, 1.3)]);
+    check_picture(&unfiltered, &filtered, "without the setting");
+}
+
+#[test]
+fn a_streamed_capture_is_drawn_with_the_settings_of_its_entity() {
+    let Some(mut studio) = Studio::of(&SPLIT) else { return };
+    let tint = LinearRgba::rgb(1.0, 0.8, 0.6);
+    let looks = (CaptureSettings { opacity: 0.6, tint, exposure: 0.5, ..default() }, ClipFade(0.9));
+    let [streamed, whole] = [ChunkTable::INDEX, JOINED].map(|file| {
+        let entity = studio.spawn(file, 0.0, ());
+        let plain = studio.shot(&[(entity, 1.3)]);
+        studio.app.world_mut().entity_mut(entity).insert(looks);
+        let changed = studio.shot(&[(entity, 1.3)]);
+        studio.app.world_mut().entity_mut(entity).insert(RenderLayers::layer(3));
+        let hidden = studio.shot(&[(entity, 1.3)]);
+        assert!(hidden.pixels().all(|pixel| pixel.0[..3] == [0; 3]), "{file}: the camera does not see its layer");
+        studio.app.world_mut().despawn(entity);
+        assert!(plain != changed, "{file}: the settings change the picture");
+        changed
+    });
+    check_picture(&streamed, &whole, "with settings, and faded");
+}
+
+#[test]
+fn a_stream_is_loaded_again_after_its_device_was_lost() {
+    let Some(mut studio) = Studio::of(&SPLIT) else { return };
+    let entity = studio.spawn(ChunkTable::INDEX, 1.3, ());
+    let app = &mut studio.app;
+    let index = get::<GaussianCapture3d>(app, entity).0.id();
     let files = |app: &App| -> BTreeSet<AssetId<GaussianCapture>> {
-        children(app, entity).into_iter().map(|part| get::<GaussianCapture3d>(app, part).0.id()).collect()
+        captures(app).iter().map(|(id, _)| id).filter(|id| *id != index).collect()
     };
-    let whole = picture(&mut app, 0.0);
-    let before = files(&app);
-    assert!(stream(&app, entity).is_whole() && !before.is_empty(), "the picture is whole");
+    let whole = picture(app, 0.0);
+    let before = files(app);
+    assert!(stream(app, entity).is_whole() && !before.is_empty(), "the picture is whole");
     // Bevy's recovery inserts a device, too.
     let device = app.world().resource::<RenderDevice>().clone();
     app.insert_resource(device);
-    run_frames(&mut app, 1);
-    assert_eq!(count_parts(&app), 0, "nothing is drawn of what was on the old device");
+    run_frames(app, 1);
+    assert_eq!(stream(app, entity).seconds, None, "nothing is drawn of what was on the old device");
     let is_there = |app: &App| stream(app, entity).is_whole();
-    wait_until(&mut app, "all files again", is_there, |app| run_frames(app, 1));
-    assert!(before.is_disjoint(&files(&app)), "they are other assets");
-    assert!(picture(&mut app, 0.0) == whole, "the same picture");
+    wait_until(app, "all files again", is_there, |app| run_frames(app, 1));
+    let after = files(app);
+    assert!(!after.is_empty() && before.is_disjoint(&after), "they are other assets");
+    assert!(picture(app, 0.0) == whole, "the same picture");
 }

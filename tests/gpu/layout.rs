@@ -124,7 +124,7 @@ fn mirrors() -> [Mirror; 22] {
             padding,
         }),
         mirror!(MotionUniforms { clip_x, clip_y, camera_z, time, near, padding }),
-        mirror!(Activation { count, first, filter_mode, segment }),
+        mirror!(Activation { count, first, filter_mode, segment, paged, first_page, segments, padding }),
         mirror!(FrameUniforms {
             size,
             tiles,
@@ -308,6 +308,8 @@ fn constants_of_the_libraries_match_the_host() {
         ("DEBUG_ACTIVE", renderer::DEBUG_ACTIVE),
         ("DEBUG_LIFESPAN", renderer::DEBUG_LIFESPAN),
         ("DEBUG_VELOCITY", renderer::DEBUG_VELOCITY),
+        ("PAGE", renderer::PAGE),
+        ("FILTER_ALL", renderer::FILTER_ALL),
         ("FILTER_BITS", renderer::FILTER_BITS),
         ("FILTER_INTERVALS", renderer::FILTER_INTERVALS),
         ("INVISIBLE", renderer::INVISIBLE),

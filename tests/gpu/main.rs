@@ -21,6 +21,7 @@ mod layout;
 mod memory;
 mod motion;
 mod packed;
+mod pages;
 mod passes;
 mod render;
 mod score;

@@ -22,6 +22,8 @@ pub enum FileState {
 #[derive(Debug, Clone)]
 pub(super) struct Ledger {
     table: Arc<ChunkTable>,
+    /// Whether files take whole pages on the GPU.
+    is_in_pages: bool,
     /// The state of each file.
     states: Vec<FileState>,
     /// The files in two of these states.
@@ -34,8 +36,20 @@ pub(super) struct Ledger {
 impl Ledger {
     /// Returns the ledger of a capture of which no file is there.
     pub(super) fn new(table: Arc<ChunkTable>) -> Self {
-        let states = vec![FileState::Absent; table.files.len()];
-        Self { table, states, requested: BTreeSet::new(), resident: BTreeSet::new(), gpu_bytes: 0, host_bytes: 0 }
+        Self {
+            states: vec![FileState::Absent; table.files.len()],
+            table,
+            is_in_pages: false,
+            requested: BTreeSet::new(),
+            resident: BTreeSet::new(),
+            gpu_bytes: 0,
+            host_bytes: 0,
+        }
+    }
+
+    /// Returns the ledger of a capture of which no file is there, and whose files take whole pages on the GPU.
+    pub(super) fn in_pages(table: Arc<ChunkTable>) -> Self {
+        Self { is_in_pages: true, ..Self::new(table) }
     }
 
     /// Returns the table of the files.
@@ -63,6 +77,11 @@ impl Ledger {
         self.gpu_bytes
     }
 
+    /// Returns the bytes that a file takes on the GPU.
+    pub(super) fn gpu_bytes_of(&self, file: usize) -> u64 {
+        if self.is_in_pages { self.table.page_bytes(file) } else { self.table.gpu_bytes(file) }
+    }
+
     /// Returns the bytes in memory of all files on the way: the files, and their Gaussians.
     pub(super) fn host_bytes(&self) -> u64 {
         self.host_bytes
@@ -80,7 +99,7 @@ impl Ledger {
     pub(super) fn request(&mut self, file: usize) {
         if self.change(file, FileState::Absent, FileState::Requested) {
             self.requested.insert(file);
-            self.gpu_bytes += self.table.gpu_bytes(file);
+            self.gpu_bytes += self.gpu_bytes_of(file);
             self.host_bytes += self.host_bytes_of(file);
         }
     }
@@ -101,7 +120,7 @@ impl Ledger {
         let was_requested = self.change(file, FileState::Requested, FileState::Absent);
         if was_requested {
             self.requested.remove(&file);
-            self.gpu_bytes -= self.table.gpu_bytes(file);
+            self.gpu_bytes -= self.gpu_bytes_of(file);
             self.host_bytes -= self.host_bytes_of(file);
         }
         was_requested
@@ -111,7 +130,7 @@ impl Ledger {
     pub(super) fn remove(&mut self, file: usize) {
         if self.change(file, FileState::Resident, FileState::Absent) {
             self.resident.remove(&file);
-            self.gpu_bytes -= self.table.gpu_bytes(file);
+            self.gpu_bytes -= self.gpu_bytes_of(file);
         }
     }
 
@@ -121,7 +140,7 @@ impl Ledger {
         state.map(|state| *state = to).is_some()
     }
 
-    /// Returns the bytes that a file takes in memory while it is on the way.
+    /// Returns the bytes that a file takes in memory while it is on the way, where its Gaussians are not in pages.
     fn host_bytes_of(&self, file: usize) -> u64 {
         let bytes = self.table.files.get(file).map_or(0, |ChunkFile { bytes, .. }| *bytes);
         bytes.saturating_add(self.table.gpu_bytes(file))
@@ -132,6 +151,7 @@ impl Ledger {
 mod tests {
     use super::super::fixture::table;
     use super::*;
+    use crate::scene::packed::BLOCK;
 
     #[test]
     fn bytes_are_counted_with_the_states_of_files() {
@@ -149,6 +169,22 @@ mod tests {
         ledger.remove(1);
         ledger.remove(1);
         assert_eq!((bytes(&ledger), ledger.state(1)), ((0, 0), FileState::Absent), "a file has been given up");
+    }
+
+    #[test]
+    fn files_in_pages_take_whole_pages_on_the_gpu_and_no_more_in_memory() {
+        assert_eq!(ChunkTable::PAGE, BLOCK as u64, "a page is a block of the packed form");
+        // Gaussians of a byte each, and as many bytes in the file.
+        let mut ledger = Ledger::in_pages(table(1, &[([0, 0], 0, 257), ([0, 0], 0, 256)]).into());
+        assert_eq!([0, 1, 2].map(|file| ledger.gpu_bytes_of(file)), [512, 256, 0], "two pages, one, and no file");
+        let bytes = |ledger: &Ledger| (ledger.gpu_bytes(), ledger.host_bytes());
+        ledger.request(0);
+        ledger.request(1);
+        assert_eq!(bytes(&ledger), (768, 514 + 512), "two requests");
+        assert!(ledger.arrive(0) && ledger.end_request(1), "one arrives, and one ends");
+        assert_eq!(bytes(&ledger), (512, 0), "a file is there");
+        ledger.remove(0);
+        assert_eq!(bytes(&ledger), (0, 0), "the file has been given up");
     }
 
     #[test]

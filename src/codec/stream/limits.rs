@@ -8,7 +8,8 @@
 /// others shrink.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StreamLimits {
-    /// Bytes on the GPU of the Gaussians of files that are there or on the way. Default: 1 GiB.
+    /// Bytes on the GPU of the Gaussians of files that are there or on the way, as
+    /// [`StreamSchedule::gpu_bytes_of`](super::StreamSchedule::gpu_bytes_of) counts them. Default: 1 GiB.
     pub gpu_bytes: u64,
     /// Bytes in memory of files on the way: the files, and their Gaussians. A file that alone is larger is fetched
     /// while no other is on the way. Default: 512 MiB.

@@ -30,8 +30,9 @@
 //! given up for them.
 //!
 //! `course` is where a player goes; `urgency` follows from the courses of all players; `intervals` finds the files of
-//! stretches; `ledger` counts files and bytes; `deadlines` says when a request has taken too long, `retries` when a
-//! file that failed is asked for again; `giving_up` selects files to give up; `schedule` joins them.
+//! stretches; `ledger` counts files and bytes, in whole pages for a host whose memory on the GPU is in pages;
+//! `deadlines` says when a request has taken too long, `retries` when a file that failed is asked for again; `giving_up`
+//! selects files to give up; `schedule` joins them.
 
 mod course;
 mod coverage;

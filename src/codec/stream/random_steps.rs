@@ -1,8 +1,8 @@
 //! A test of streaming in random steps.
 //!
 //! In: random tables, players that play, jump and come and go, limits that shrink and grow, files that arrive in any
-//! order, late or not at all. Out: proof that the rules hold at every step, and that all of a picture is there as soon
-//! as memory and files allow for it.
+//! order, late or not at all, with and without pages. Out: proof that the rules hold at every step, and that all of a
+//! picture is there as soon as memory and files allow for it.
 
 use super::course::Axis;
 use super::fixture::random_head;
@@ -21,6 +21,8 @@ const STEPS: usize = 400;
 struct Host {
     random: Random,
     table: Arc<ChunkTable>,
+    /// Whether files take whole pages on the GPU.
+    is_in_pages: bool,
     duration: f32,
     schedule: StreamSchedule,
     heads: Vec<Playhead>,
@@ -57,13 +59,19 @@ fn random_table(random: &mut Random) -> ChunkTable {
 }
 
 impl Host {
-    fn new(seed: u64) -> Self {
+    fn new(seed: u64, is_in_pages: bool) -> Self {
         let mut random = Random::new(seed);
-        let table: Arc<ChunkTable> = random_table(&mut random).into();
+        let mut table = random_table(&mut random);
+        if is_in_pages {
+            // Up to four pages.
+            table.files.iter_mut().for_each(|file| file.gaussians *= 20);
+        }
+        let table: Arc<ChunkTable> = table.into();
         let duration = random.in_range(0.5, 60.0);
         assert_eq!(table.check(), Ok(()), "capture {seed} has a good table");
+        let schedule = StreamSchedule::new(table.clone(), duration.into());
         Self {
-            schedule: StreamSchedule::new(table.clone(), duration.into()),
+            schedule: if is_in_pages { schedule.in_pages() } else { schedule },
             heads: vec![random_head(&mut random, duration)],
             limits: StreamLimits::default(),
             now: 0.0,
@@ -75,14 +83,16 @@ impl Host {
             failures: 0,
             random,
             table,
+            is_in_pages,
             duration,
         }
     }
 
     /// Returns the bytes of a file on the GPU, and in memory while it is on the way.
     fn bytes(&self, file: usize) -> [u64; 2] {
-        let gpu_bytes = self.table.gpu_bytes(file);
-        [gpu_bytes, gpu_bytes + self.table.files[file].bytes]
+        let own = self.table.gpu_bytes(file);
+        let on_gpu = if self.is_in_pages { self.table.page_bytes(file) } else { own };
+        [on_gpu, own + self.table.files[file].bytes]
     }
 
     /// Returns the bytes on the GPU and in memory of all files that are there or on the way.
@@ -285,8 +295,8 @@ impl Host {
 
 #[test]
 fn the_rules_hold_in_random_steps() {
-    for seed in 0..CAPTURES {
-        let mut host = Host::new(seed);
+    for (seed, is_in_pages) in (0..CAPTURES).flat_map(|seed| [(seed, false), (seed, true)]) {
+        let mut host = Host::new(seed, is_in_pages);
         for step in 0..STEPS {
             host.change();
             host.plan();

@@ -199,6 +199,39 @@ fn a_file_that_is_larger_than_all_memory_is_left_out() {
 }
 
 #[test]
+fn files_in_pages_need_room_for_whole_pages() {
+    // Two pages and one page each, of Gaussians of a byte.
+    let files = [([0, 1], 0, 257), ([0, 0], 0, 1), ([1, 1], 0, 1)];
+    assert_eq!(schedule(2, &files).gpu_bytes_of(0), 257, "each Gaussian by itself");
+    assert_eq!(schedule(2, &files).in_pages().gpu_bytes_of(0), 512, "whole pages");
+    let fetched = |mut schedule: StreamSchedule, gpu_bytes| {
+        let [fetched, _] = settle(&mut schedule, &[head(0.5, 1.0, Turn::Stop)], &limits(gpu_bytes, 1));
+        (fetched, schedule.gpu_bytes())
+    };
+    assert_eq!(fetched(schedule(2, &files), 259), (vec![0, 1, 2], 259), "there is room for each Gaussian");
+    let in_pages = |gpu_bytes| fetched(schedule(2, &files).in_pages(), gpu_bytes);
+    assert_eq!(in_pages(259), (vec![1], 256), "there is one page: the first file is larger, the last has no room");
+    assert_eq!(in_pages(767), (vec![0], 512), "two pages");
+    assert_eq!(in_pages(1024), (vec![0, 1, 2], 1024), "four pages");
+}
+
+#[test]
+fn files_in_pages_make_room_by_whole_pages() {
+    let files = [([0, 0], 0, 1), ([0, 0], 0, 1), ([0, 0], 0, 1), ([0, 0], 0, 1), ([1, 1], 0, 257)];
+    let mut schedule = schedule(2, &files).in_pages();
+    let near = StreamLimits { ahead: 0.0, ..limits(1024, 1) };
+    settle(&mut schedule, &[head(0.5, 1.0, Turn::Stop)], &near);
+    assert_eq!((schedule.resident(), schedule.gpu_bytes()), (4, 1024), "four Gaussians in four pages");
+    let heads = [head(1.5, 1.0, Turn::Stop)];
+    assert_eq!(settle(&mut schedule, &heads, &near), [vec![4], vec![3, 2]], "two pages for two");
+    let less = schedule.plan(0.0, &heads, &StreamLimits { gpu_bytes: 1023, ..near });
+    assert_eq!(less, StreamPlan { fetch: vec![], give_up: vec![1] }, "a page less");
+    let least = schedule.plan(0.0, &heads, &StreamLimits { gpu_bytes: 511, ..near });
+    assert_eq!(least, StreamPlan { fetch: vec![], give_up: vec![4] }, "the file of two pages has no room");
+    assert_eq!(schedule.gpu_bytes(), 256, "one page is left");
+}
+
+#[test]
 fn requests_are_limited_in_number_and_in_memory() {
     let files = [([0, 0], 0, 10), ([0, 0], 0, 10), ([0, 0], 0, 100), ([0, 0], 0, 10)];
     let mut schedule = schedule(1, &files);
@@ -370,10 +403,11 @@ fn tables_and_players_without_sense_have_plans() {
     let wild = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 0.0, 5e-324, 1e308, -1e308];
     let files = [([0, 0], 0, u64::MAX), ([5, 2], 99, 7), ([0, u32::MAX], u32::MAX, u64::MAX), ([1, 1], 0, 0)];
     for duration in wild {
-        for stretches in [0, 1, 3, u32::MAX] {
+        for (stretches, is_in_pages) in [(0, true), (1, false), (3, false), (3, true), (u32::MAX, false)] {
             let mut table = table(stretches, &files);
             table.gaussian_bytes = u32::MAX;
-            let mut schedule = StreamSchedule::new(table.into(), duration);
+            let schedule = StreamSchedule::new(table.into(), duration);
+            let mut schedule = if is_in_pages { schedule.in_pages() } else { schedule };
             for (number, a) in wild.iter().enumerate() {
                 let b = wild[(number + 1) % wild.len()];
                 for turn in [Turn::Stop, Turn::Loop, Turn::Return] {

@@ -84,6 +84,14 @@ impl StreamSchedule {
         }
     }
 
+    /// Returns the same schedule for a host that keeps files in whole pages of [`ChunkTable::PAGE`] Gaussians on the
+    /// GPU, as the renderer does: there, each file counts with [`ChunkTable::page_bytes`] in place of
+    /// [`ChunkTable::gpu_bytes`]. No file is there.
+    pub fn in_pages(self) -> Self {
+        let ledger = Ledger::in_pages(self.table().clone());
+        Self { ledger, ..self }
+    }
+
     /// Returns the table of the files.
     pub fn table(&self) -> &Arc<ChunkTable> {
         self.ledger.table()
@@ -139,7 +147,7 @@ impl StreamSchedule {
                 break;
             }
             let room = limits.gpu_bytes.saturating_sub(self.ledger.gpu_bytes());
-            let excess = self.table().gpu_bytes(file).saturating_sub(room);
+            let excess = self.gpu_bytes_of(file).saturating_sub(room);
             if excess > 0 {
                 let ranked = last_needed_first.get_or_insert_with(|| self.last_needed_first(&demand));
                 let Some(given_up) = self.files_to_give_up(ranked, excess, urgency.least_given_up()) else {
@@ -206,6 +214,12 @@ impl StreamSchedule {
         self.ledger.gpu_bytes()
     }
 
+    /// Returns the bytes of a file on the GPU, in whole pages if the host [keeps files in pages](Self::in_pages); 0 for
+    /// a file that the table does not have.
+    pub fn gpu_bytes_of(&self, file: usize) -> u64 {
+        self.ledger.gpu_bytes_of(file)
+    }
+
     /// Returns the bytes in memory of files on the way: the files, and their Gaussians.
     pub fn host_bytes(&self) -> u64 {
         self.ledger.host_bytes()
@@ -256,7 +270,7 @@ impl StreamSchedule {
     /// Returns whether a file on the way is of use: a player reaches it, and it has room.
     fn is_of_use(&self, file: usize, demand: &Demand, limits: &StreamLimits) -> bool {
         let is_reached = self.urgency(file, demand).is_some_and(|urgency| urgency.is_wanted);
-        is_reached && self.table().gpu_bytes(file) <= limits.gpu_bytes
+        is_reached && self.gpu_bytes_of(file) <= limits.gpu_bytes
     }
 
     /// Returns the files that may be fetched, the most urgent first. A file that several players need may occur more
@@ -268,7 +282,7 @@ impl StreamSchedule {
         }
         let may_be_fetched = |file: &usize| {
             let is_absent = self.state(*file) == FileState::Absent;
-            is_absent && self.table().gpu_bytes(*file) <= limits.gpu_bytes && !self.waits(*file)
+            is_absent && self.gpu_bytes_of(*file) <= limits.gpu_bytes && !self.waits(*file)
         };
         demand.most_urgent(count, |[from, to]| {
             let files = self.files.along(from, to).filter(may_be_fetched);
@@ -289,7 +303,7 @@ impl StreamSchedule {
     fn files_to_give_up(&self, ranked: &[Urgency], excess: u64, least: f64) -> Option<Vec<usize>> {
         let later = ranked.iter().take_while(|urgency| urgency.seconds() >= least).map(|urgency| urgency.file);
         let there = later.filter(|file| self.state(*file) == FileState::Resident);
-        files_to_give_up(there.map(|file| (file, self.table().gpu_bytes(file))), excess)
+        files_to_give_up(there.map(|file| (file, self.gpu_bytes_of(file))), excess)
     }
 
     /// Gives up files that are there.

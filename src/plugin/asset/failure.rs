@@ -103,18 +103,18 @@ pub enum CaptureFailure {
         /// The fault and the remedy.
         reason: String,
     },
-    /// The most important Gaussians of a moment of a capture in chunk files do not fit
+    /// The most important Gaussians of a moment of a capture in chunk files do not fit its share of
     /// [`StreamBudget::gpu_bytes`](crate::stream::StreamBudget::gpu_bytes).
     #[error(
-        "{path}: the most important Gaussians of a moment take {needed} bytes on the GPU, and StreamBudget::gpu_bytes \
-         is {limit}: raise it, or cut the capture with a smaller first layer or into shorter stretches"
+        "{path}: the most important Gaussians of a moment take {needed} bytes on the GPU, and its share of \
+         StreamBudget::gpu_bytes is {limit}: raise it, or cut the capture with a smaller first layer or into shorter stretches"
     )]
     OverBudget {
         /// Path of the asset.
         path: String,
         /// Bytes of these Gaussians.
         needed: u64,
-        /// The budget, in bytes.
+        /// Its share of the budget, in bytes.
         limit: u64,
     },
     /// The GPU was lost or refused an object.

@@ -11,24 +11,23 @@ use super::failure::CaptureFailure;
 use super::messages::Announcer;
 use super::state::CaptureState;
 use super::uploads::Uploads;
-use crate::plugin::component::{CapturePart, GaussianCapture, GaussianCapture3d};
+use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use bevy::asset::{AssetEvent, AssetId, AssetLoadFailedEvent, AssetServer, Assets, LoadState};
 use bevy::ecs::change_detection::{DetectChanges, DetectChangesMut, Ref};
 use bevy::ecs::entity::Entity;
 use bevy::ecs::message::MessageReader;
-use bevy::ecs::query::Without;
 use bevy::ecs::system::{Local, Query, Res};
 use bevy::log::debug_span;
 use std::collections::{HashMap, HashSet};
 
-/// Updates the state of every entity with a capture, and sends messages about changes. Parts of a capture have none.
+/// Updates the state of every entity with a capture, and sends messages about changes.
 pub(super) fn update_states(
     server: Res<AssetServer>,
     loaded: Res<Assets<GaussianCapture>>,
     mut changes: MessageReader<AssetEvent<GaussianCapture>>,
     mut failures: MessageReader<AssetLoadFailedEvent<GaussianCapture>>,
     uploads: Res<Uploads>,
-    mut captures: Query<(Entity, Ref<GaussianCapture3d>, &mut CaptureState), Without<CapturePart>>,
+    mut captures: Query<(Entity, Ref<GaussianCapture3d>, &mut CaptureState)>,
     mut announcer: Announcer,
     mut reported: Local<ReportedFailures>,
 ) {
@@ -124,7 +123,7 @@ pub(super) fn any_upload_failure(uploads: Res<Uploads>) -> bool {
 /// version of the capture is still drawn.
 pub(super) fn report_upload_failures(
     uploads: Res<Uploads>,
-    mut captures: Query<(Entity, &GaussianCapture3d, &mut CaptureState), Without<CapturePart>>,
+    mut captures: Query<(Entity, &GaussianCapture3d, &mut CaptureState)>,
     mut announcer: Announcer,
 ) {
     let mut uploads = uploads.lock();

@@ -25,6 +25,10 @@ pub(super) struct UploadStates {
     finished: HashSet<AssetId<GaussianCapture>>,
     /// Captures in chunk files whose first picture is there.
     streams: HashSet<AssetId<GaussianCapture>>,
+    /// Of which capture a chunk file is, and its number.
+    files: HashMap<AssetId<GaussianCapture>, (AssetId<GaussianCapture>, usize)>,
+    /// The bytes that the Gaussians of captures in chunk files may take on the GPU.
+    granted: HashMap<AssetId<GaussianCapture>, u64>,
     pub(super) failures: HashMap<AssetId<GaussianCapture>, UploadFailure>,
 }
 
@@ -83,7 +87,32 @@ impl Uploads {
 
     /// Records that a capture in chunk files is not streamed any more.
     pub(crate) fn end_stream(&self, index: AssetId<GaussianCapture>) {
-        self.lock().streams.remove(&index);
+        let mut states = self.lock();
+        states.streams.remove(&index);
+        states.granted.remove(&index);
+    }
+
+    /// Records the bytes that the Gaussians of a capture in chunk files may take on the GPU.
+    pub(crate) fn grant(&self, index: AssetId<GaussianCapture>, bytes: u64) {
+        self.lock().granted.insert(index, bytes);
+    }
+
+    /// Returns the bytes that the Gaussians of a capture in chunk files may take on the GPU; `None` if it is not streamed.
+    pub(crate) fn granted(&self, index: AssetId<GaussianCapture>) -> Option<u64> {
+        self.lock().granted.get(&index).copied()
+    }
+
+    /// Records that a capture that is being loaded is a chunk file of a capture, and its number.
+    pub(crate) fn join(&self, file: AssetId<GaussianCapture>, index: AssetId<GaussianCapture>, number: usize) {
+        let mut states = self.lock();
+        if states.expected {
+            states.files.insert(file, (index, number));
+        }
+    }
+
+    /// Returns the capture of which a capture is a chunk file, and its number.
+    pub(crate) fn file_of(&self, file: AssetId<GaussianCapture>) -> Option<(AssetId<GaussianCapture>, usize)> {
+        self.lock().files.get(&file).copied()
     }
 
     /// Records that the upload of a capture begins. `is_drawn`: whether an earlier version is drawn until the upload
@@ -116,6 +145,7 @@ impl Uploads {
         states.drawn.remove(&capture);
         states.finished.remove(&capture);
         states.failures.remove(&capture);
+        states.files.remove(&capture);
     }
 
     pub(super) fn lock(&self) -> MutexGuard<'_, UploadStates> {

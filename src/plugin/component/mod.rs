@@ -8,13 +8,13 @@ mod capture;
 mod capture_3d;
 mod edited;
 mod key_frames;
-mod part;
+mod picture;
 mod upright;
 
 pub use capture::GaussianCapture;
 pub use capture_3d::GaussianCapture3d;
 pub use edited::CaptureEditError;
 pub use key_frames::KeyFrames;
-pub use part::CapturePart;
+pub(crate) use picture::StreamedPicture;
 pub(crate) use upright::stand_upright;
 pub use upright::{Upright, UprightTurn};

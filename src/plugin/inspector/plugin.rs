@@ -13,7 +13,7 @@ use crate::plugin::asset::{CaptureAssetPlugin, CaptureState};
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use crate::plugin::playback::Playback;
 use crate::plugin::render::{CameraFault, CaptureSettings, CaptureStatistics, CaptureViewSettings, DepthWrite};
-use crate::plugin::stream::{CapturePart, CaptureStreamState};
+use crate::plugin::stream::CaptureStreamState;
 use bevy::app::{App, Last, Plugin, PreUpdate, Update};
 use bevy::asset::{AssetServer, Assets};
 use bevy::camera::visibility::{InheritedVisibility, VisibleEntities};
@@ -179,7 +179,7 @@ type Sight = (&'static Camera, &'static VisibleEntities, Option<&'static Composi
 #[derive(SystemParam)]
 struct Subject<'w, 's> {
     commands: Commands<'w, 's>,
-    captures: Query<'w, 's, CaptureParts, Without<CapturePart>>,
+    captures: Query<'w, 's, CaptureParts>,
     streams: Query<'w, 's, &'static CaptureStreamState>,
     cameras: Query<'w, 's, CameraParts, With<Camera3d>>,
     sights: Query<'w, 's, Sight, With<Camera3d>>,

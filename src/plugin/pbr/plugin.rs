@@ -2,11 +2,9 @@
 //!
 //! In: an app in which captures are drawn. Out: order among lit meshes, shading, cast shadows and contact shadows.
 
-use super::{CaptureLight, CastsShadows, ReceivesShadows, contact_shadow, order, shade, shadow};
+use super::{contact_shadow, order, shade, shadow};
 use crate::plugin::render::has_captures;
-use crate::plugin::stream::{copy_to_parts, mark_parts};
 use bevy::app::{App, Plugin};
-use bevy::light::{NotShadowCaster, NotShadowReceiver};
 use bevy::render::RenderApp;
 
 /// Combines captures with lit meshes: fog, shadows, light of the scene. Part of
@@ -32,10 +30,5 @@ fn add_once(app: &mut App) {
         shade::build(app);
         shadow::build(app);
         contact_shadow::build(app);
-        copy_to_parts::<CastsShadows>(app);
-        copy_to_parts::<ReceivesShadows>(app);
-        copy_to_parts::<CaptureLight>(app);
-        mark_parts::<NotShadowCaster>(app);
-        mark_parts::<NotShadowReceiver>(app);
     }
 }

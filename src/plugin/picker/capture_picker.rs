@@ -3,7 +3,7 @@
 //! In: the components and assets of captures. Out: [`CapturePicker`], a system parameter.
 
 use crate::gaussian::alpha::reach_squared;
-use crate::plugin::component::{CapturePart, GaussianCapture, GaussianCapture3d};
+use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use crate::plugin::playback::{ClipFade, Playback};
 use crate::plugin::render::CaptureSettings;
 use crate::plugin::render::logged::warn_once_each;
@@ -11,7 +11,7 @@ use crate::scene::{PickSettings, RuntimeScene};
 use bevy::asset::Assets;
 use bevy::camera::visibility::InheritedVisibility;
 use bevy::ecs::entity::Entity;
-use bevy::ecs::query::{ROQueryItem, Without};
+use bevy::ecs::query::ROQueryItem;
 use bevy::ecs::system::{Query, Res, SystemParam};
 use bevy::math::Ray3d;
 use bevy::transform::components::GlobalTransform;
@@ -75,7 +75,7 @@ pub struct CaptureHit {
 #[derive(SystemParam)]
 pub struct CapturePicker<'w, 's> {
     assets: Res<'w, Assets<GaussianCapture>>,
-    captures: Query<'w, 's, Placed, Without<CapturePart>>,
+    captures: Query<'w, 's, Placed>,
 }
 
 type Placed = (

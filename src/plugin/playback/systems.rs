@@ -12,7 +12,7 @@ use super::stall::Stall;
 use super::state::PlaybackState;
 use super::timeline::{TimelinePlayer, TimelineTrack};
 use crate::plugin::asset::Uploads;
-use crate::plugin::component::{CapturePart, GaussianCapture, GaussianCapture3d};
+use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use bevy::asset::{AssetId, Assets};
 use bevy::ecs::change_detection::DetectChangesMut;
 use bevy::ecs::entity::Entity;
@@ -53,7 +53,7 @@ pub(super) fn run_clocks(time: Res<Time>, mut clocks: Query<&mut PlaybackClock>)
 }
 
 /// Advances the playback of every loaded capture, followed captures before their followers. No time passes before the
-/// first drawn frame of a capture, and while it is stalled. Parts of a capture have the time of their parent.
+/// first drawn frame of a capture, and while it is stalled.
 pub(super) fn advance_captures(
     time: Res<Time>,
     captures: Res<Assets<GaussianCapture>>,
@@ -63,7 +63,7 @@ pub(super) fn advance_captures(
     others: Query<(&Playback, &PlaybackState), (Without<GaussianCapture3d>, Without<TimelinePlayer>)>,
     mut players: Query<
         (Entity, &GaussianCapture3d, &mut Playback, &mut PlaybackState, Option<&Markers>, Option<&Stall>),
-        (Without<TimelinePlayer>, Without<CapturePart>),
+        Without<TimelinePlayer>,
     >,
     mut announcer: Announcer,
 ) {

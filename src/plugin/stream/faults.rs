@@ -1,6 +1,6 @@
 //! Faults: why the picture of a time may never be there.
 //!
-//! In: what is there of a capture in chunk files, a time, the budget. Out: a [`CaptureFailure`] with the remedy, if
+//! In: what is there of a capture in chunk files, a time, its share of the budget. Out: a [`CaptureFailure`] with the remedy, if
 //! something is in the way that time alone does not mend.
 
 use crate::codec::stream::StreamSchedule;
@@ -13,19 +13,19 @@ use bevy::asset::{AssetId, AssetPath};
 const MANY: u32 = 5;
 
 /// Returns why the most important Gaussians of a time may never be there: seconds since the start of a capture, whose
-/// index is at a path, within a budget of bytes on the GPU.
+/// index is at a path, within its share of the bytes on the GPU.
 pub(super) fn fault(
     schedule: &StreamSchedule,
     seconds: f64,
-    gpu_bytes: u64,
+    share: u64,
     index: &AssetPath<'_>,
 ) -> Option<CaptureFailure> {
     let table = schedule.table();
     let is_first = |file: &usize| table.files.get(*file).is_some_and(|chunk| chunk.layer == 0);
     let first_layer: Vec<usize> = schedule.needed_at(seconds).filter(is_first).collect();
-    let needed = first_layer.iter().map(|file| table.gpu_bytes(*file)).fold(0, u64::saturating_add);
-    if needed > gpu_bytes {
-        return Some(CaptureFailure::OverBudget { path: index.to_string(), needed, limit: gpu_bytes });
+    let needed = first_layer.iter().map(|file| schedule.gpu_bytes_of(*file)).fold(0, u64::saturating_add);
+    if needed > share {
+        return Some(CaptureFailure::OverBudget { path: index.to_string(), needed, limit: share });
     }
     let failing = first_layer.into_iter().find(|file| schedule.failures_in_a_row(*file) >= MANY)?;
     let name = ChunkTable::file_name(failing, table.files.len());

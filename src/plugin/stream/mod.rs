@@ -11,9 +11,9 @@
 //!  chunk files ──▶ fetch_files ◀─────────────────────────┘        which files are there: codec::stream
 //!                       │
 //!                       ▼
-//!                  show_parts ──▶ a child entity for each file of the time, CaptureStreamState, messages
+//!                  show_pictures ──▶ StreamedPicture: the time that is drawn, CaptureStreamState, messages
 //!                       │
-//!                       └───────▶ Stall: time waits
+//!                       └──────────▶ Stall: time waits
 //! ```
 //!
 //! A game spawns the index as any other capture, plays it and seeks in it. Each file has the Gaussians that are only
@@ -22,20 +22,16 @@
 //! [`crate::codec::stream`] decides which files are loaded and given up; it has no I/O, and players without Bevy use it
 //! as well.
 
-mod copies;
 mod faults;
 mod heads;
 mod messages;
-mod parts;
+mod pictures;
 mod plugin;
 mod settings;
 mod shares;
 mod state;
 mod streams;
 
-pub use super::component::CapturePart;
-#[cfg(feature = "pbr")]
-pub(crate) use copies::{copy_to_parts, mark_parts};
 pub use messages::{CaptureBuffered, CaptureBuffering, CaptureStalled};
 pub use plugin::{CaptureStreamPlugin, CaptureStreamSystems};
 pub use settings::{CaptureStreamSettings, OnUnderrun, StreamBudget};

@@ -2,18 +2,13 @@
 //!
 //! In: an app in which captures load and play. Out: the same app, in which captures in chunk files are streamed.
 
-use super::copies::copy_to_parts;
 use super::messages::{CaptureBuffered, CaptureBuffering, CaptureStalled};
-use super::parts::{begin_parts, despawn_strays, show_parts};
+use super::pictures::{begin_pictures, show_pictures};
 use super::settings::StreamBudget;
 use super::streams::{Streams, fetch_files};
 use crate::plugin::asset::{set_up, set_up_late};
-use crate::plugin::component::CapturePart;
-use crate::plugin::playback::{ClipFade, PlaybackSystems};
-use crate::plugin::render::CaptureSettings;
+use crate::plugin::playback::PlaybackSystems;
 use bevy::app::{App, Plugin, Update};
-use bevy::camera::visibility::RenderLayers;
-use bevy::ecs::schedule::common_conditions::any_with_component;
 use bevy::ecs::schedule::{IntoScheduleConfigs, SystemSet};
 
 /// Streams captures in chunk files. Part of [`GaussianCapturePlugins`](crate::GaussianCapturePlugins). Without it such
@@ -43,14 +38,6 @@ fn add(app: &mut App) {
         .add_message::<CaptureBuffered>()
         .add_message::<CaptureStalled>()
         .configure_sets(Update, CaptureStreamSystems.after(PlaybackSystems::Advance))
-        .add_systems(Update, begin_parts.before(PlaybackSystems::Advance))
-        .add_systems(
-            Update,
-            (fetch_files, show_parts, despawn_strays.run_if(any_with_component::<CapturePart>))
-                .chain()
-                .in_set(CaptureStreamSystems),
-        );
-    copy_to_parts::<CaptureSettings>(app);
-    copy_to_parts::<ClipFade>(app);
-    copy_to_parts::<RenderLayers>(app);
+        .add_systems(Update, begin_pictures.before(PlaybackSystems::Advance))
+        .add_systems(Update, (fetch_files, show_pictures).chain().in_set(CaptureStreamSystems));
 }

@@ -30,7 +30,8 @@ use bevy::reflect::std_traits::ReflectDefault;
 #[reflect(Resource, Default, Debug, Clone, PartialEq)]
 #[type_path = "bevy_gs4d::stream"]
 pub struct StreamBudget {
-    /// Bytes of Gaussians on the GPU, those on their way included. Default: 1 GiB.
+    /// Bytes of Gaussians on the GPU, those on their way included, in whole pages of 256 Gaussians for each file. While the
+    /// share of a capture changes, its buffers of before exist as well. Default: 1 GiB.
     pub gpu_bytes: u64,
     /// Bytes in memory of files on their way to the GPU: the files, and their Gaussians. A file that alone is larger
     /// is loaded while no other is. Default: 512 MiB.

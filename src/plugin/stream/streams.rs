@@ -11,7 +11,7 @@ use super::shares::{OnTheWay, Sight, ask_in_turns, shares};
 use super::state::CaptureStreamState;
 use crate::codec::stream::{FileState, Playhead, StreamLimits, StreamSchedule};
 use crate::plugin::asset::{CaptureFailure, CaptureLoaderSettings, Uploads};
-use crate::plugin::component::{CapturePart, GaussianCapture, GaussianCapture3d};
+use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use crate::plugin::playback::Playback;
 use crate::plugin::render::logged::error_once_each;
 use crate::scene::{ChunkTable, ColorCodebooks};
@@ -19,8 +19,6 @@ use bevy::asset::{AssetId, AssetPath, AssetServer, Assets, Handle, RenderAssetUs
 use bevy::camera::Camera;
 use bevy::camera::visibility::ViewVisibility;
 use bevy::ecs::change_detection::DetectChanges;
-use bevy::ecs::hierarchy::Children;
-use bevy::ecs::query::{With, Without};
 use bevy::ecs::resource::Resource;
 use bevy::ecs::system::{Query, Res, ResMut};
 use bevy::log::debug_span;
@@ -72,12 +70,14 @@ pub(super) struct Stream {
     /// The codebooks of colors, which the index has for all files.
     codebooks: Option<Arc<ColorCodebooks>>,
     files: HashMap<usize, Handle<GaussianCapture>>,
+    /// Its share of the memory on the GPU, bytes.
+    share: u64,
 }
 
 impl Stream {
     fn new(table: Arc<ChunkTable>, duration: f32, index: Option<AssetPath<'static>>) -> Self {
-        let schedule = StreamSchedule::new(table, duration.into());
-        Self { schedule, index, codebooks: None, files: HashMap::new() }
+        let schedule = StreamSchedule::new(table, duration.into()).in_pages();
+        Self { schedule, index, codebooks: None, files: HashMap::new(), share: 0 }
     }
 
     /// Returns the handle of a file that is there.
@@ -87,14 +87,9 @@ impl Stream {
 
     /// Returns why the most important Gaussians of a time of the index `id` may never be there, in seconds since the
     /// capture's start.
-    pub(super) fn fault(
-        &self,
-        id: AssetId<GaussianCapture>,
-        seconds: f64,
-        budget: &StreamBudget,
-    ) -> Option<CaptureFailure> {
+    pub(super) fn fault(&self, id: AssetId<GaussianCapture>, seconds: f64) -> Option<CaptureFailure> {
         match &self.index {
-            Some(index) => fault(&self.schedule, seconds, budget.gpu_bytes, index),
+            Some(index) => fault(&self.schedule, seconds, self.share, index),
             None => Some(without_folder(id)),
         }
     }
@@ -135,8 +130,18 @@ impl Stream {
         });
     }
 
-    /// Loads and gives up files.
-    fn follow(&mut self, now: f64, heads: &[Playhead], limits: &StreamLimits, server: &AssetServer) {
+    /// Loads and gives up files of the index `id`.
+    fn follow(
+        &mut self,
+        id: AssetId<GaussianCapture>,
+        now: f64,
+        heads: &[Playhead],
+        limits: &StreamLimits,
+        server: &AssetServer,
+        uploads: &Uploads,
+    ) {
+        self.share = limits.gpu_bytes;
+        uploads.grant(id, self.share);
         let plan = self.schedule.plan(now, heads, limits);
         for file in plan.give_up {
             self.files.remove(&file);
@@ -156,7 +161,9 @@ impl Stream {
                 settings.asset_usage = RenderAssetUsages::RENDER_WORLD;
                 settings.read.codebooks.clone_from(&codebooks);
             };
-            self.files.insert(file, server.load_builder().with_settings(drawn).load(&path));
+            let handle = server.load_builder().with_settings(drawn).load(&path);
+            uploads.join(handle.id(), id, file);
+            self.files.insert(file, handle);
             if is_stuck {
                 server.reload(path);
             }
@@ -180,7 +187,6 @@ type Placed = (
     &'static ViewVisibility,
     Option<&'static CaptureStreamSettings>,
     Option<&'static CaptureStreamState>,
-    Option<&'static Children>,
 );
 
 /// Begins and ends streams, and loads and gives up their files.
@@ -189,8 +195,7 @@ pub(super) fn fetch_files(
     server: Res<AssetServer>,
     uploads: Res<Uploads>,
     budget: Res<StreamBudget>,
-    placed: Query<Placed, Without<CapturePart>>,
-    seen: Query<&ViewVisibility, With<CapturePart>>,
+    placed: Query<Placed>,
     cameras: Query<(&Camera, &GlobalTransform)>,
     device: Option<Res<RenderDevice>>,
     mut streams: ResMut<Streams>,
@@ -202,7 +207,7 @@ pub(super) fn fetch_files(
     let mut wanted: BTreeMap<AssetId<GaussianCapture>, (Vec<Playhead>, Sight)> = BTreeMap::new();
     let eyes: Vec<Vec3> =
         cameras.iter().filter(|(camera, _)| camera.is_active).map(|(_, place)| place.translation()).collect();
-    for (handle, playback, place, visibility, settings, state, children) in &placed {
+    for (handle, playback, place, visibility, settings, state) in &placed {
         let id = handle.0.id();
         let Some(capture) = captures.get(id) else { continue };
         let Some(table) = &capture.scene().chunks else { continue };
@@ -228,10 +233,7 @@ pub(super) fn fetch_files(
         let held = state.filter(|state| !state.is_coarse).and_then(|state| state.seconds);
         let preload = settings.iter().flat_map(|settings| settings.preload.iter().copied());
         heads.extend(held.into_iter().chain(preload).map(still));
-        // The index itself is everywhere.
-        let mut parts = children.into_iter().flatten().filter_map(|child| seen.get(*child).ok());
-        let is_seen = visibility.get() && (parts.clone().next().is_none() || parts.any(|part| part.get()));
-        sight.add(is_seen, place.translation(), &eyes);
+        sight.add(visibility.get(), place.translation(), &eyes);
     }
     streams.streams.retain(|id, _| {
         let stays = wanted.contains_key(id);
@@ -245,16 +247,16 @@ pub(super) fn fetch_files(
     }
     let shares = shares(wanted.values().map(|(_, sight)| sight));
     // Those that are wanted, in the same order.
-    let asking = streams.streams.values_mut().zip(wanted.values()).zip(shares);
-    let mut asking: Vec<_> = asking.map(|((stream, (heads, _)), share)| (stream, heads, share)).collect();
+    let asking = streams.streams.values_mut().zip(&wanted).zip(shares);
+    let mut asking: Vec<_> = asking.map(|((stream, (id, (heads, _))), share)| (*id, stream, heads, share)).collect();
     asking.sort_by(|(.., a), (.., b)| b.total_cmp(a));
-    let mut on_the_way: Vec<OnTheWay> = asking.iter().map(|(stream, ..)| stream.on_the_way()).collect();
+    let mut on_the_way: Vec<OnTheWay> = asking.iter().map(|(_, stream, ..)| stream.on_the_way()).collect();
     let most = OnTheWay { requests: budget.requests as usize, host_bytes: budget.host_bytes };
     ask_in_turns(most, &mut on_the_way, |number, OnTheWay { requests, host_bytes }| {
-        let (stream, heads, share) = &mut asking[number];
+        let (id, stream, heads, share) = &mut asking[number];
         let gpu_bytes = (budget.gpu_bytes as f64 * *share) as u64;
         let limits = StreamLimits { gpu_bytes, host_bytes, requests, ahead: budget.ahead_seconds.into() };
-        stream.follow(now, heads, &limits, &server);
+        stream.follow(*id, now, heads, &limits, &server, &uploads);
         stream.on_the_way()
     });
 }
@@ -309,7 +311,8 @@ mod tests {
         // The first request, its deadline, and the second request.
         for (now, is_requested, count) in [(0.0, true, 1), (31.0, false, 1), (31.5, true, 2)] {
             let server = app.world().resource::<AssetServer>().clone();
-            stream.follow(now, &[still(0.0)], &StreamLimits::default(), &server);
+            let uploads = Uploads::default();
+            stream.follow(AssetId::default(), now, &[still(0.0)], &StreamLimits::default(), &server, &uploads);
             let state = (stream.files.len() == 1, stream.schedule.requested() == 1);
             assert_eq!(state, (is_requested, is_requested), "at {now} s the file is on its way, or is not");
             let began = Instant::now();

@@ -32,9 +32,28 @@ pub(super) struct Filling {
     is_filled: Option<Arc<AtomicBool>>,
 }
 
-/// The content of a buffer.
+/// A kind of buffers.
 #[derive(Debug, Clone, Copy)]
-enum Content {
+pub(super) struct Kind {
+    pub label: &'static str,
+    pub content: Content,
+    /// Bytes of a record.
+    pub size: usize,
+}
+
+impl Kind {
+    /// Returns the number of records of so many Gaussians, from the beginning of a block.
+    pub(super) fn records(&self, gaussians: usize) -> usize {
+        match self.content {
+            Content::Ranges => SHARED_RANGES + gaussians.div_ceil(BLOCK) * BLOCK_RANGES,
+            _ => gaussians,
+        }
+    }
+}
+
+/// The content of a buffer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Content {
     /// Gaussians, with `1/σ_t` in place of `σ_t`: zero instead of infinity.
     Gaussians,
     /// A copy of `mean_t` and `1/σ_t`.
@@ -66,34 +85,40 @@ pub(super) fn largest_record(form: &Form, stride: usize) -> u64 {
     geometry.max(color) as u64
 }
 
-/// Creates the buffers of the geometry of the Gaussians in `own`, which starts at a multiple of a block.
-pub(super) fn geometry(allocator: Allocator<'_>, form: &Form, own: Range<usize>) -> Vec<Filling> {
-    let new = |label, content, size, count| Filling::new(allocator, label, content, own.clone(), size, count);
+/// Returns the kinds of buffers of the geometry.
+pub(super) fn geometry_kinds(form: &Form) -> [Kind; 2] {
+    let kind = |label, content, size| Kind { label, content, size };
     match form {
-        Form::Sliced(_) => vec![
-            new("gs4d gaussians", Content::Gaussians, size_of::<Gaussian>(), own.len()),
-            new("gs4d lifespans", Content::Lifespans, size_of::<[f32; 2]>(), own.len()),
+        Form::Sliced(_) => [
+            kind("gs4d gaussians", Content::Gaussians, size_of::<Gaussian>()),
+            kind("gs4d lifespans", Content::Lifespans, size_of::<[f32; 2]>()),
         ],
-        Form::Packed(_) => {
-            let ranges = SHARED_RANGES + own.len().div_ceil(BLOCK) * BLOCK_RANGES;
-            vec![
-                new("gs4d records", Content::Records, size_of::<[u32; RECORD_WORDS]>(), own.len()),
-                new("gs4d ranges", Content::Ranges, size_of::<[f32; 4]>(), ranges),
-            ]
-        }
+        Form::Packed(_) => [
+            kind("gs4d records", Content::Records, size_of::<[u32; RECORD_WORDS]>()),
+            kind("gs4d ranges", Content::Ranges, size_of::<[f32; 4]>()),
+        ],
     }
+}
+
+/// Returns the kind of the buffer of colors, without codebooks. `stride` as for [`largest_record`].
+pub(super) fn color_kind(form: &Form, stride: usize) -> Kind {
+    match form.coded_colors() {
+        Some(_) => {
+            Kind { label: "gs4d color records", content: Content::ColorRecords, size: size_of::<[u32; COLOR_WORDS]>() }
+        }
+        None => Kind { label: "gs4d harmonics", content: Content::Harmonics, size: stride * 16 },
+    }
+}
+
+/// Creates the buffers of the geometry of the Gaussians in `own`, which starts at a multiple of a block.
+pub(super) fn geometry(allocator: Allocator<'_>, form: &Form, own: Range<usize>) -> [Filling; 2] {
+    geometry_kinds(form).map(|kind| Filling::new(allocator, kind, own.clone(), kind.records(own.len())))
 }
 
 /// Creates the buffer of the colors of the Gaussians in `own`, without codebooks. `stride` as for [`largest_record`].
 pub(super) fn color(allocator: Allocator<'_>, form: &Form, own: Range<usize>, stride: usize) -> Filling {
     let count = own.len();
-    match form.coded_colors() {
-        Some(_) => {
-            let size = size_of::<[u32; COLOR_WORDS]>();
-            Filling::new(allocator, "gs4d color records", Content::ColorRecords, own, size, count)
-        }
-        None => Filling::new(allocator, "gs4d harmonics", Content::Harmonics, own, stride * 16, count),
-    }
+    Filling::new(allocator, color_kind(form, stride), own, count)
 }
 
 /// Returns the words of one codebook entry on the GPU: 48 half-precision values for each time harmonic, independent of the spatial degree.
@@ -132,10 +157,13 @@ pub(super) fn codebooks_in(buffer: wgpu::Buffer, colors: &CodedColors, is_filled
 }
 
 /// Creates a buffer of this many bytes that shaders read. A binding of no bytes is not allowed.
-fn storage(allocator: Allocator<'_>, label: &str, bytes: usize) -> wgpu::Buffer {
+pub(super) fn storage(allocator: Allocator<'_>, label: &str, bytes: usize) -> wgpu::Buffer {
     // A binding of no bytes is not allowed.
     allocator.buffer(label, bytes as u64, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC)
 }
+
+/// The kind of the buffers of active sets.
+pub(super) const FILTER_KIND: Kind = Kind { label: "gs4d filter", content: Content::Filter, size: size_of::<u32>() };
 
 /// Creates the buffer of the active sets of the Gaussians in `own`, which starts at a multiple of 32.
 pub(super) fn filter(allocator: Allocator<'_>, filter: &TemporalFilter, own: Range<usize>) -> Filling {
@@ -143,12 +171,13 @@ pub(super) fn filter(allocator: Allocator<'_>, filter: &TemporalFilter, own: Ran
         ActiveSets::Bits(_) => own_words(&own).len() * filter.segments as usize,
         ActiveSets::Intervals(_) => own.len(),
     };
-    Filling::new(allocator, "gs4d filter", Content::Filter, own, size_of::<u32>(), count)
+    Filling::new(allocator, FILTER_KIND, own, count)
 }
 
 /// Creates the buffer of an environment map.
 pub(super) fn environment(allocator: Allocator<'_>, map: &Environment) -> Filling {
-    Filling::new(allocator, "gs4d environment", Content::Environment, 0..0, size_of::<f32>(), map.texels.len())
+    let kind = Kind { label: "gs4d environment", content: Content::Environment, size: size_of::<f32>() };
+    Filling::new(allocator, kind, 0..0, map.texels.len())
 }
 
 /// Returns the range of words of these Gaussians in a bit set.
@@ -158,14 +187,7 @@ fn own_words(own: &Range<usize>) -> Range<usize> {
 
 impl Filling {
     /// Creates a buffer. It is filled through the queue, since mapping would panic on a lost device.
-    fn new(
-        allocator: Allocator<'_>,
-        label: &str,
-        content: Content,
-        own: Range<usize>,
-        size: usize,
-        count: usize,
-    ) -> Self {
+    fn new(allocator: Allocator<'_>, Kind { label, content, size }: Kind, own: Range<usize>, count: usize) -> Self {
         let buffer = storage(allocator, label, count.max(1) * size);
         Self { buffer, content, own, size, count, done: 0, is_filled: None }
     }
@@ -206,48 +228,13 @@ impl Filling {
 
     /// Converts a range of records. Returns `None` if the buffer does not belong to the form of this scene.
     fn convert(&self, scene: &RuntimeScene, records: Range<usize>, to: &mut [u8]) -> Option<()> {
-        let form = &scene.form;
-        let own = self.own.start + records.start..self.own.start + records.end;
-        let size = self.size;
         match self.content {
-            Content::Gaussians => {
-                let gaussians = &form.as_sliced()?.gaussians[self.own.clone()];
-                each(records, size, to, |index, record| {
-                    let gaussian = gaussians[index];
-                    let sigma_t = gaussian.sigma_t.recip();
-                    record.copy_from_slice(bytemuck::bytes_of(&Gaussian { sigma_t, ..gaussian }));
-                });
-            }
-            Content::Lifespans => {
-                let gaussians = &form.as_sliced()?.gaussians[self.own.clone()];
-                each(records, size, to, |index, record| {
-                    let Gaussian { mean_t, sigma_t, .. } = gaussians[index];
-                    record.copy_from_slice(bytemuck::bytes_of(&[mean_t, sigma_t.recip()]));
-                });
-            }
-            Content::Harmonics => {
-                let harmonics = form.harmonics()?;
-                let used = harmonics.evaluated() * 3;
-                each(records, size, to, |index, record| {
-                    let values = &harmonics.of(self.own.start + index)[..used];
-                    record[..used * 4].copy_from_slice(bytemuck::cast_slice(values));
-                });
-            }
-            Content::Records => to.copy_from_slice(bytemuck::cast_slice(&form.as_packed()?.records[own])),
-            Content::Ranges => {
-                let ranges = &form.as_packed()?.ranges;
-                let before = self.own.start / BLOCK * BLOCK_RANGES;
-                each(records, size, to, |index, record| {
-                    let index = if index < SHARED_RANGES { index } else { before + index };
-                    record.copy_from_slice(bytemuck::bytes_of(&ranges[index]));
-                });
-            }
-            Content::ColorRecords => to.copy_from_slice(bytemuck::cast_slice(&form.coded_colors()?.records[own])),
-            Content::Codebooks => convert_entries(form.coded_colors()?, records.start, size, to),
+            Content::Codebooks => convert_entries(scene.form.coded_colors()?, records.start, self.size, to),
             Content::Filter => self.convert_filter(scene.filter.as_ref()?, records, to),
             Content::Environment => {
                 to.copy_from_slice(bytemuck::cast_slice(&scene.environment.as_ref()?.texels[records]));
             }
+            of_gaussians => convert(of_gaussians, &scene.form, self.own.start, records, to)?,
         }
         Some(())
     }
@@ -267,6 +254,51 @@ impl Filling {
             }
         }
     }
+}
+
+/// Converts a range of records of geometry or color of the Gaussians from `first` on, which starts a block. Returns `None`
+/// if the form has no such records.
+pub(super) fn convert(content: Content, form: &Form, first: usize, records: Range<usize>, to: &mut [u8]) -> Option<()> {
+    if records.is_empty() {
+        return Some(());
+    }
+    let (own, size) = (first + records.start..first + records.end, to.len() / records.len());
+    match content {
+        Content::Gaussians => {
+            let gaussians = &form.as_sliced()?.gaussians;
+            each(own, size, to, |index, record| {
+                let gaussian = gaussians[index];
+                let sigma_t = gaussian.sigma_t.recip();
+                record.copy_from_slice(bytemuck::bytes_of(&Gaussian { sigma_t, ..gaussian }));
+            });
+        }
+        Content::Lifespans => {
+            let gaussians = &form.as_sliced()?.gaussians;
+            each(own, size, to, |index, record| {
+                let Gaussian { mean_t, sigma_t, .. } = gaussians[index];
+                record.copy_from_slice(bytemuck::bytes_of(&[mean_t, sigma_t.recip()]));
+            });
+        }
+        Content::Harmonics => {
+            let harmonics = form.harmonics()?;
+            let used = harmonics.evaluated() * 3;
+            each(own, size, to, |index, record| {
+                record[..used * 4].copy_from_slice(bytemuck::cast_slice(&harmonics.of(index)[..used]));
+            });
+        }
+        Content::Records => to.copy_from_slice(bytemuck::cast_slice(&form.as_packed()?.records[own])),
+        Content::Ranges => {
+            let ranges = &form.as_packed()?.ranges;
+            let before = first / BLOCK * BLOCK_RANGES;
+            each(records, size, to, |index, record| {
+                let index = if index < SHARED_RANGES { index } else { before + index };
+                record.copy_from_slice(bytemuck::bytes_of(&ranges[index]));
+            });
+        }
+        Content::ColorRecords => to.copy_from_slice(bytemuck::cast_slice(&form.coded_colors()?.records[own])),
+        Content::Codebooks | Content::Filter | Content::Environment => return None,
+    }
+    Some(())
 }
 
 /// Converts entries of the codebooks, from the entry `first` on, of `size` bytes each.

@@ -5,6 +5,7 @@
 //! by one dispatch.
 
 use super::buffers::{self, Filling};
+use super::paged_gaussians::PagedGaussians;
 use super::prefixes::Prefixes;
 use crate::gaussian::ShDirection;
 use crate::gaussian::harmonics::evaluated;
@@ -30,15 +31,17 @@ pub struct GpuCapture {
     /// Identifies this upload within the process.
     pub(in crate::renderer) id: u64,
     pub(in crate::renderer) filter: Option<Filter>,
+    /// The pages of its buffers, if its Gaussians are in chunk files.
+    pub(in crate::renderer) pages: Option<PagedGaussians>,
     /// Of its Gaussians, those that a thinned capture needs.
     pub(in crate::renderer) prefixes: Prefixes,
     /// Bytes of its buffers, without the filter.
-    bytes: u64,
+    pub(super) bytes: u64,
     /// The box around its Gaussians at all times, in capture space, if it is known. It changes no picture.
     pub(crate) bounds: Option<Bounds>,
     /// Color and time settings of the uniforms of an instance; the rest is zero.
     pub(in crate::renderer) settings: InstanceUniforms,
-    len: usize,
+    pub(super) len: usize,
 }
 
 /// A range of Gaussians that fits into one binding.
@@ -53,6 +56,32 @@ pub(in crate::renderer) struct Part {
     pub filter: Option<wgpu::BindGroup>,
 }
 
+impl Part {
+    /// Creates the bind groups of a part of so many Gaussians, given the buffers of geometry, of color, and of the codebooks, if
+    /// colors are coded.
+    pub(super) fn new(
+        device: &wgpu::Device,
+        renderer: &Renderer,
+        storage: Storage,
+        count: u32,
+        [geometry, color, codebooks]: [&[wgpu::Buffer]; 3],
+    ) -> Self {
+        let [of_geometry, of_color] = &renderer.layouts.captures[storage as usize];
+        let group = |layout: &wgpu::BindGroupLayout, buffers: &[wgpu::Buffer]| {
+            let resources: Vec<_> = buffers.iter().map(wgpu::Buffer::as_entire_binding).collect();
+            renderer.allocator(device).bind_group("gs4d capture", layout, &resources)
+        };
+        let colors = [color, codebooks].concat();
+        Self {
+            count,
+            geometry: group(of_geometry, geometry),
+            color: group(of_color, &colors),
+            buffers: [geometry, &colors].concat(),
+            filter: None,
+        }
+    }
+}
+
 /// The data of a temporal filter that the host needs.
 #[derive(Debug)]
 pub(in crate::renderer) struct Filter {
@@ -60,14 +89,14 @@ pub(in crate::renderer) struct Filter {
     pub mode: u32,
     /// Whether the capture has other Gaussians at other times, as the frames of a sequence.
     pub is_window: bool,
-    segments: u32,
-    interval: [f32; 2],
-    /// Number of active Gaussians, part by part and segment by segment.
-    counts: Vec<u32>,
+    pub segments: u32,
+    pub interval: [f32; 2],
+    /// Number of active Gaussians, part by part and segment by segment. Pages have those of a capture in chunk files.
+    pub counts: Vec<u32>,
     /// The same of each prefix.
-    prefix_counts: Vec<Vec<u32>>,
+    pub prefix_counts: Vec<Vec<u32>>,
     /// Bytes of its buffers.
-    bytes: u64,
+    pub bytes: u64,
     /// Largest number of active Gaussians of all parts in any segment.
     pub most: u32,
 }
@@ -129,28 +158,16 @@ impl GpuCapture {
         let stride = (evaluated(degree, degree_t) * 3).div_ceil(4);
         let per_part = per_part(&device.limits(), scene, stride)?;
         let storage = Storage::of(form);
-        let [of_geometry, of_color] = &renderer.layouts.captures[storage as usize];
-        let group = |layout: &wgpu::BindGroupLayout, buffers: &[wgpu::Buffer]| {
-            let resources: Vec<_> = buffers.iter().map(wgpu::Buffer::as_entire_binding).collect();
-            allocator.bind_group("gs4d capture", layout, &resources)
-        };
         let (mut parts, mut fillings) = (Vec::new(), Vec::new());
         let codebooks = form.coded_colors().map(|colors| renderer.codebooks.claim(allocator, colors));
+        let shared: Vec<_> = codebooks.iter().map(|(buffer, _)| buffer.clone()).collect();
         for first in (0..scene.len()).step_by(per_part) {
             let own = first..(first + per_part).min(scene.len());
             let geometry = buffers::geometry(allocator, form, own.clone());
             let color = buffers::color(allocator, form, own.clone(), stride);
-            let buffer = |filling: &Filling| filling.buffer.clone();
-            let shared = codebooks.iter().map(|(buffer, _)| buffer.clone());
-            let colors = [buffer(&color)].into_iter().chain(shared).collect();
-            let both: [Vec<wgpu::Buffer>; 2] = [geometry.iter().map(buffer).collect(), colors];
-            parts.push(Part {
-                count: own.len() as u32,
-                geometry: group(of_geometry, &both[0]),
-                color: group(of_color, &both[1]),
-                buffers: both.concat(),
-                filter: None,
-            });
+            let buffers = geometry.each_ref().map(|filling| filling.buffer.clone());
+            let buffers = [&buffers[..], std::slice::from_ref(&color.buffer), &shared];
+            parts.push(Part::new(device, renderer, storage, own.len() as u32, buffers));
             fillings.extend(geometry.into_iter().chain([color]));
         }
         fillings.extend(codebooks.and_then(|(_, filling)| filling));
@@ -161,10 +178,19 @@ impl GpuCapture {
             EnvironmentBuffer { buffer, size: [map.width, map.height] }
         });
         let bytes = fillings.iter().map(|filling| filling.buffer.size()).sum();
-        let (settings, id) = (settings(scene, stride), NEXT_ID.fetch_add(1, Ordering::Relaxed));
-        let (prefixes, len) = (Prefixes::of(scene), scene.len());
-        let mut capture =
-            Self { parts, environment, storage, id, filter: None, prefixes, bytes, bounds: None, settings, len };
+        let mut capture = Self {
+            parts,
+            environment,
+            storage,
+            id: next_id(),
+            filter: None,
+            pages: None,
+            prefixes: Prefixes::of(scene),
+            bytes,
+            bounds: None,
+            settings: settings(scene, stride),
+            len: scene.len(),
+        };
         if let Some(filter) = &scene.filter {
             fillings.extend(capture.allocate_filter(allocator, renderer, filter, scene.trained_with.time_interval));
         }
@@ -191,7 +217,7 @@ impl GpuCapture {
         let bytes = fillings.iter().map(|filling| filling.buffer.size()).sum();
         self.filter = Some(Filter::new(filter, interval, &self.parts, &self.prefixes, bytes));
         // Active lists of the previous filter become invalid.
-        self.id = NEXT_ID.fetch_add(1, Ordering::Relaxed);
+        self.id = next_id();
         fillings
     }
 
@@ -216,7 +242,7 @@ impl GpuCapture {
         Ok(())
     }
 
-    /// Returns the number of Gaussians.
+    /// Returns the number of Gaussians; of a capture in chunk files, those of the files that are there.
     pub fn len(&self) -> usize {
         self.len
     }
@@ -242,9 +268,10 @@ impl GpuCapture {
     }
 
     /// Returns for each part its number of Gaussians and its buffers of records, lifespans and color coefficients, for passes of clients that
-    /// write them. Returns nothing if the capture is packed.
+    /// write them. Returns nothing if the capture is packed or in chunk files.
     pub fn writable(&self) -> impl Iterator<Item = (u32, [&wgpu::Buffer; 3])> {
-        let parts = if self.storage == Storage::Sliced { &self.parts[..] } else { &[] };
+        let is_writable = self.storage == Storage::Sliced && self.pages.is_none();
+        let parts = if is_writable { &self.parts[..] } else { &[] };
         parts.iter().filter_map(|part| {
             let buffers = part.buffers.iter().collect::<Vec<_>>().try_into().ok()?;
             Some((part.count, buffers))
@@ -269,11 +296,15 @@ impl GpuCapture {
     }
 }
 
-static NEXT_ID: AtomicU64 = AtomicU64::new(0);
+/// Returns the identifier of another upload.
+pub(super) fn next_id() -> u64 {
+    static NEXT: AtomicU64 = AtomicU64::new(0);
+    NEXT.fetch_add(1, Ordering::Relaxed)
+}
 
 /// Returns the number of Gaussians of each part but the last: a multiple of the block that one workgroup of `activate` processes. `stride` is the
 /// number of four-vectors of color coefficients per Gaussian.
-fn per_part(limits: &wgpu::Limits, scene: &RuntimeScene, stride: usize) -> Result<usize, GpuError> {
+pub(super) fn per_part(limits: &wgpu::Limits, scene: &RuntimeScene, stride: usize) -> Result<usize, GpuError> {
     let limit = binding_limit(limits);
     let map = scene.environment.as_ref().map_or(0, |map| size_of_val(map.texels.as_slice()) as u64);
     if map > limit {
@@ -292,7 +323,7 @@ fn per_part(limits: &wgpu::Limits, scene: &RuntimeScene, stride: usize) -> Resul
 }
 
 /// Returns the color and time settings of a scene as uniforms, with zero in place of all others.
-fn settings(scene: &RuntimeScene, stride: usize) -> InstanceUniforms {
+pub(super) fn settings(scene: &RuntimeScene, stride: usize) -> InstanceUniforms {
     let (trained_with, colors) = (&scene.trained_with, scene.form.coded_colors());
     let ColorDegrees { degree, degree_t, .. } = scene.form.color_degrees();
     InstanceUniforms {

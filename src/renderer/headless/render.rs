@@ -99,6 +99,11 @@ impl Headless {
         self.precision = precision;
     }
 
+    /// Returns the renderer, for captures in chunk files.
+    pub fn renderer(&self) -> &Renderer {
+        &self.renderer
+    }
+
     /// Sets whether temporal filters are used. Default: `true`.
     pub fn use_filters(&mut self, filtered: bool) {
         self.filtered = filtered;

@@ -4,7 +4,7 @@
 //! cameras with `DistanceFog`. Out (render world): [`ExtractedShading`] and [`ShadeRequests`], by main-world entity.
 
 use super::components::{CaptureLight, ReceivesShadows};
-use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
+use crate::plugin::component::{GaussianCapture, GaussianCapture3d, StreamedPicture};
 use crate::plugin::pbr::shadow::CastsShadows;
 use crate::plugin::render::views::shade_requests::ShadeRequests;
 use bevy::asset::Assets;
@@ -55,6 +55,7 @@ type Placed = (
     Has<NotShadowReceiver>,
     Option<(&'static CastsShadows, Has<NotShadowCaster>)>,
     Option<&'static CaptureLight>,
+    Option<&'static StreamedPicture>,
 );
 
 /// Returns whether a capture or camera of the main world needs shading, or needed it in the previous frame.
@@ -82,14 +83,16 @@ pub(super) fn extract_shading(
         return;
     }
     requests.cameras.extend(foggy.iter().map(MainEntity::from));
-    for (entity, capture, transform, bounds, shadows, is_no_receiver, casts, light) in &captures {
+    for (entity, capture, transform, bounds, shadows, is_no_receiver, casts, light, picture) in &captures {
         let Some(asset) = assets.get(&capture.0) else { continue };
         let placed = PlacedShading {
             cube_from_world: bounds.and_then(|bounds| cube_from_world(bounds, transform.affine())),
             has_environment: asset.scene().environment.is_some(),
             shadows: shadows.copied().filter(|_| !is_no_receiver),
             own_shadow: match casts {
-                Some((casts, false)) => casts.distance(asset, &transform.affine()),
+                Some((casts, false)) => {
+                    casts.distance(picture.map_or(asset.extent(), |picture| picture.extent), &transform.affine())
+                }
                 Some((_, true)) | None => 0.0,
             },
             light: light.copied(),

@@ -2,7 +2,6 @@
 //!
 //! In: fields that any system or animation may set. Out: resolution and bias of the capture's shadows.
 
-use crate::plugin::component::GaussianCapture;
 use bevy::ecs::component::Component;
 use bevy::ecs::reflect::ReflectComponent;
 use bevy::reflect::Reflect;
@@ -49,11 +48,12 @@ pub struct CastsShadows {
 }
 
 impl CastsShadows {
-    /// Returns the distance of the shadow of a capture behind its surface, world units.
-    pub(in crate::plugin::pbr) fn distance(&self, capture: &GaussianCapture, world_from_capture: &Affine3A) -> f32 {
+    /// Returns the distance of the shadow of a capture behind its surface, world units, given the typical extent of its
+    /// Gaussians.
+    pub(in crate::plugin::pbr) fn distance(&self, extent: f32, world_from_capture: &Affine3A) -> f32 {
         let matrix = world_from_capture.matrix3;
         let scale = Vec3A::from([matrix.x_axis, matrix.y_axis, matrix.z_axis].map(Vec3A::length)).max_element();
-        let distance = self.bias * capture.extent() * scale;
+        let distance = self.bias * extent * scale;
         if distance.is_finite() { distance.max(0.0) } else { 0.0 }
     }
 }

@@ -5,7 +5,7 @@
 //! their active lists are updated even if no camera sees them.
 
 use super::casts::{CastsShadows, ShadowResolution};
-use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
+use crate::plugin::component::{GaussianCapture, GaussianCapture3d, StreamedPicture};
 use crate::plugin::playback::Playback;
 use crate::plugin::render::ExtractedCaptures;
 use bevy::asset::Assets;
@@ -57,6 +57,7 @@ type Placed = (
     &'static InheritedVisibility,
     Option<&'static Aabb>,
     Option<&'static RenderLayers>,
+    Option<&'static StreamedPicture>,
 );
 
 pub(super) fn extract_casters(
@@ -66,7 +67,7 @@ pub(super) fn extract_casters(
     captures: Extract<Query<Placed, Casting>>,
 ) {
     casters.0.clear();
-    for (entity, capture, settings, playback, visibility, bounds, layers) in &captures {
+    for (entity, capture, settings, playback, visibility, bounds, layers, picture) in &captures {
         let entity = MainEntity::from(entity);
         let Some(placed) = extracted.0.get_mut(&entity).filter(|placed| visibility.get() && !placed.is_faded_out())
         else {
@@ -75,15 +76,16 @@ pub(super) fn extract_casters(
         let Some(asset) = assets.get(&capture.0) else { continue };
         // A capture with an environment map has no box, since cameras never cull it, but its Gaussians have bounds.
         let known = || {
-            let bounds = asset.bounds_at(playback.time)?;
+            let bounds = picture.map_or_else(|| asset.bounds_at(playback.time), |picture| picture.bounds)?;
             (bounds.min.is_finite() && bounds.max.is_finite()).then(|| Aabb::from_min_max(bounds.min, bounds.max))
         };
         let Some(bounds) = bounds.copied().or_else(known) else { continue };
+        let extent = picture.map_or(asset.extent(), |picture| picture.extent);
         (placed.seen, placed.casts) = (true, true);
         casters.0.push(Caster {
             entity,
             resolution: settings.resolution,
-            bias: settings.distance(asset, &placed.world_from_capture),
+            bias: settings.distance(extent, &placed.world_from_capture),
             bounds,
             world_from_capture: placed.world_from_capture,
             layers: layers.cloned().unwrap_or_default(),

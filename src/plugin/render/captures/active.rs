@@ -25,7 +25,8 @@ use bevy::render::sync_world::{MainEntity, MainEntityHashMap};
 #[derive(Resource, Default)]
 pub(crate) struct ActiveLists {
     pub(in crate::plugin::render) placed: MainEntityHashMap<PlacedList>,
-    /// Captures for whose list there was no memory. Until the retry, all of their Gaussians are drawn.
+    /// Captures for whose list there was no memory. Until the retry, all of their Gaussians are drawn, or none of a capture
+    /// in chunk files.
     back_off: BackOff<MainEntity>,
 }
 
@@ -51,18 +52,21 @@ pub(in crate::plugin::render) fn prepare_active_lists(
     let Some(renderer) = renderer else { return };
     lists.back_off.count_frame();
     lists.placed.retain(|entity, placed| {
-        let shown = extracted.0.get(entity).filter(|shown| shown.filtered && shown.asset == placed.asset);
-        let uploaded = shown.and_then(|shown| captures.get(shown.asset)?.capture());
-        uploaded.is_some_and(|capture| placed.list.is_for(capture))
+        let shown = extracted.0.get(entity).filter(|shown| shown.asset == placed.asset && !shown.is_blank);
+        let uploaded = shown.and_then(|shown| Some((shown, captures.get(shown.asset)?.capture()?)));
+        uploaded.is_some_and(|(shown, capture)| shown.is_listed(capture) && placed.list.is_for(capture))
     });
     for (entity, shown) in &extracted.0 {
         // Levels of detail have no filter. Lights draw all Gaussians, whatever level cameras draw.
         let is_coarse = levels.is_coarse(entity) && !shown.casts;
-        if !(shown.seen && shown.filtered) || shown.is_faded_out() || is_coarse {
+        if !shown.seen || shown.is_faded_out() || shown.is_blank || is_coarse {
             continue;
         }
         let Some(uploaded) = captures.get(shown.asset) else { continue };
         let (Some(capture), Some(time)) = (uploaded.capture(), uploaded.time_at(shown.seconds)) else { continue };
+        if !shown.is_listed(capture) {
+            continue;
+        }
         if !lists.placed.contains_key(entity) {
             if lists.back_off.contains(entity) {
                 continue;

@@ -3,9 +3,10 @@
 //! In (main world): entities with a loaded capture, their transform, playback and settings; the settings of cameras.
 //! Out (render world): [`ExtractedCaptures`] and [`ExtractedViewSettings`], by entity of the main world.
 
-use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
+use crate::plugin::component::{GaussianCapture, GaussianCapture3d, StreamedPicture};
 use crate::plugin::playback::{ClipFade, Playback};
 use crate::plugin::render::settings::{CaptureSettings, CaptureViewSettings};
+use crate::renderer::GpuCapture;
 use crate::scene::Bounds;
 use crate::view::Appearance;
 use bevy::asset::{AssetId, Assets};
@@ -34,6 +35,8 @@ pub(crate) struct ExtractedCapture {
     pub(in crate::plugin::render) center: Vec3,
     /// Seconds since the capture's start.
     pub(crate) seconds: f32,
+    /// Whether no Gaussian is drawn: those of the first picture have not been loaded.
+    pub(crate) is_blank: bool,
     /// Whether its temporal filter is used.
     pub(crate) filtered: bool,
     /// Without thinning, which depends on the view.
@@ -55,6 +58,12 @@ impl ExtractedCapture {
     pub(crate) fn is_faded_out(&self) -> bool {
         self.appearance.opacity <= 0.0
     }
+
+    /// Returns whether the Gaussians that are drawn are listed: those of a temporal filter, if it is used, or those that are
+    /// there of a capture in chunk files.
+    pub(crate) fn is_listed(&self, capture: &GpuCapture) -> bool {
+        self.filtered || capture.paged_bytes().is_some()
+    }
 }
 
 /// The settings of cameras that have a [`CaptureViewSettings`].
@@ -69,6 +78,7 @@ type Placed = (
     &'static GlobalTransform,
     &'static ViewVisibility,
     Option<&'static ClipFade>,
+    Option<&'static StreamedPicture>,
 );
 
 /// Returns whether a resource of the main world has changed, or been added, since the last extraction.
@@ -83,15 +93,17 @@ pub(crate) fn extract_captures(
 ) {
     let _span = debug_span!("gs4d/extract").entered();
     extracted.0.clear();
-    for (entity, capture, settings, playback, transform, visibility, fade) in &captures {
+    for (entity, capture, settings, playback, transform, visibility, fade, picture) in &captures {
         let Some(loaded) = assets.get(&capture.0) else { continue };
-        let bounds = loaded.bounds_at(playback.time);
+        let picture = picture.copied().filter(|_| loaded.scene().chunks.is_some());
+        let bounds = picture.map_or_else(|| loaded.bounds_at(playback.time), |picture| picture.bounds);
         let center = |bounds: Bounds| transform.transform_point((bounds.min + bounds.max) / 2.0);
         let placed = ExtractedCapture {
             asset: capture.0.id(),
             world_from_capture: transform.affine(),
             center: bounds.map_or(transform.translation(), center),
-            seconds: playback.time,
+            seconds: picture.and_then(|picture| picture.seconds).unwrap_or(playback.time),
+            is_blank: picture.is_some_and(|picture| picture.seconds.is_none()),
             filtered: settings.filter,
             antialias: settings.antialias,
             appearance: settings.appearance(fade.copied().unwrap_or_default().0),

@@ -6,6 +6,7 @@
 pub(crate) mod active;
 pub(crate) mod back_off;
 pub(crate) mod budget;
+mod chunk_files;
 pub(crate) mod detail;
 pub(crate) mod extract;
 pub(crate) mod previous;

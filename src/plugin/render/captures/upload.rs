@@ -3,15 +3,18 @@
 //! In: [`GaussianCapture`] and the upload budget of a frame. Out: [`GpuGaussianCapture`] in `RenderAssets`, drawn once
 //! it is complete, and its state in [`Uploads`], which is sent as messages. After a change, the old version is drawn
 //! until the new one is complete, and kept if the GPU rejects the new one: if it refuses a buffer, has no memory for
-//! it, or no view could draw the capture.
+//! it, or no view could draw the capture. A chunk file has no buffers of its own: it is uploaded into the pages of the
+//! capture of which it is a file.
 
 use super::budget::ThinnedCapture;
+use super::chunk_files::{ChunkFile, Destination, PlacedFiles};
 use crate::plugin::asset::{CaptureFailure, Uploads};
 use crate::plugin::component::GaussianCapture;
+use crate::plugin::render::logged::warn_once_each;
 use crate::plugin::render::renderer::CaptureRenderer;
 use crate::plugin::render::statistics::CaptureStatistics;
 use crate::renderer::device::memory::{Caught, catch, catch_known};
-use crate::renderer::{CaptureUpload, GpuCapture, GpuError, Storage, ViewRenderer};
+use crate::renderer::{CaptureUpload, GpuCapture, GpuError, Renderer, Storage, ViewRenderer};
 use crate::scene::{Bounds, Importances, Level, RuntimeScene};
 use crate::view::Optics;
 use bevy::asset::{AssetId, AssetServer, RenderAssetUsages};
@@ -63,6 +66,8 @@ pub struct GpuGaussianCapture {
     shown: Option<Arc<ShownCapture>>,
     /// The version that will replace `shown`.
     next: Option<NextCapture>,
+    /// A file of another capture.
+    file: Option<ChunkFile>,
 }
 
 /// A capture whose upload is complete.
@@ -73,6 +78,48 @@ struct ShownCapture {
     importances: Vec<Importances>,
     /// The source of these buffers, which may be older than the asset.
     source: GaussianCapture,
+    /// The chunk files that are in the pages of the first of the levels.
+    files: PlacedFiles,
+}
+
+impl ShownCapture {
+    /// Keeps the chunk files of the version before, if the table of them is the same: they are not loaded again.
+    fn keep_files(&mut self, mut before: Self) {
+        let tables = self.source.scene().chunks.as_ref().zip(before.source.scene().chunks.as_ref());
+        let levels = self.levels.first_mut().zip(before.levels.first_mut());
+        if let Some((capture, from)) = levels.filter(|_| tables.is_some_and(|(table, other)| Arc::ptr_eq(table, other)))
+        {
+            capture.take_pages(from);
+            self.files = before.files;
+            self.importances = before.importances;
+        }
+    }
+
+    /// Changes the capture and its chunk files, with the place to which these are uploaded.
+    fn change_files<T>(
+        &mut self,
+        to: &UploadTarget<'_>,
+        most_bytes: u64,
+        change: impl FnOnce(&mut GpuCapture, &mut PlacedFiles, &Destination<'_>) -> T,
+    ) -> Option<T> {
+        let Self { levels, importances, source, files } = self;
+        let capture = levels.first_mut()?;
+        let UploadTarget { device, queue, renderer } = *to;
+        let (before, index) = (capture.len(), &*source);
+        let changed = change(capture, files, &Destination { device, queue, renderer, index, most_bytes });
+        if let Some(importances) = importances.first_mut().filter(|_| capture.len() != before) {
+            *importances = files.importances();
+        }
+        Some(changed)
+    }
+}
+
+/// Where captures are uploaded to.
+#[derive(Clone, Copy)]
+struct UploadTarget<'a> {
+    device: &'a wgpu::Device,
+    queue: &'a wgpu::Queue,
+    renderer: &'a Renderer,
 }
 
 /// A capture that is being uploaded.
@@ -140,9 +187,9 @@ impl GpuGaussianCapture {
 
     /// Returns what decides about the Gaussians that are left out of a level of detail; `None` as for its buffers.
     pub(crate) fn thinned(&self, index: usize) -> Option<ThinnedCapture<'_>> {
-        let ShownCapture { importances, source, .. } = &**self.shown.as_ref()?;
+        let ShownCapture { importances, levels, .. } = &**self.shown.as_ref()?;
         let importances = importances.get(index).or(importances.first())?;
-        Some(ThinnedCapture { importances, bounds: source.bounds() })
+        Some(ThinnedCapture { importances, bounds: levels.first()?.bounds })
     }
 
     /// Returns the levels of detail and the bounds over all times of the drawn capture; `None` if it has no levels.
@@ -177,13 +224,8 @@ impl GpuGaussianCapture {
     ///
     /// # Errors
     /// When the GPU has no memory for the upload, or for buffers created before. The next version is dropped.
-    fn advance(
-        &mut self,
-        device: &wgpu::Device,
-        queue: &RenderQueue,
-        renderer: &CaptureRenderer,
-        bytes: u64,
-    ) -> Result<u64, GpuError> {
+    fn advance(&mut self, to: &UploadTarget<'_>, bytes: u64) -> Result<u64, GpuError> {
+        let UploadTarget { device, queue, renderer } = *to;
         let Some(mut next) = self.next.take() else { return Ok(0) };
         if let Some(result) = next.pending.as_mut().and_then(Caught::poll) {
             next.pending = None;
@@ -193,7 +235,7 @@ impl GpuGaussianCapture {
             let mut written = 0;
             for upload in &mut next.uploads {
                 if written < bytes {
-                    written += upload.advance(queue, &renderer.0, bytes - written);
+                    written += upload.advance(queue, renderer, bytes - written);
                 }
             }
             written
@@ -201,7 +243,7 @@ impl GpuGaussianCapture {
         if !next.is_complete() {
             self.next = Some(next);
         } else {
-            let finish = |upload: CaptureUpload<_>| upload.finish(queue, &renderer.0);
+            let finish = |upload: CaptureUpload<_>| upload.finish(queue, renderer);
             let mut levels: Vec<_> = next.uploads.into_iter().map(finish).collect();
             let mut source = next.source;
             for level in &mut levels {
@@ -210,14 +252,30 @@ impl GpuGaussianCapture {
             if source.usages() == RenderAssetUsages::RENDER_WORLD {
                 source.release();
             }
-            self.shown = Some(Arc::new(ShownCapture { levels, importances: next.importances, source }));
+            let (importances, files) = (next.importances, PlacedFiles::default());
+            let mut shown = ShownCapture { levels, importances, source, files };
+            if let Some(before) = self.shown.take().and_then(Arc::into_inner) {
+                shown.keep_files(before);
+            }
+            self.shown = Some(Arc::new(shown));
         }
         Ok(written)
     }
 
     /// Returns the bytes that remain to be uploaded; `None` if no upload is in progress.
     pub(in crate::plugin::render) fn bytes_left(&self) -> Option<u64> {
-        self.next.as_ref().map(NextCapture::bytes_left)
+        let of_file = || self.file.as_ref().and_then(ChunkFile::bytes_left);
+        self.next.as_ref().map(NextCapture::bytes_left).or_else(of_file)
+    }
+
+    /// Returns whether it has pages for chunk files.
+    fn has_pages(&self) -> bool {
+        self.capture().is_some_and(|capture| capture.paged_bytes().is_some())
+    }
+
+    /// Returns what is drawn; `None` if nothing is, and in the frame in which the capture is replaced.
+    fn shown_mut(&mut self) -> Option<&mut ShownCapture> {
+        self.shown.as_mut().and_then(Arc::get_mut)
     }
 }
 
@@ -251,8 +309,12 @@ impl RenderAsset for GpuGaussianCapture {
             // The failure has already been logged once for all captures.
             let reason = statistics.renderer_missing().unwrap_or_else(|| "there is no renderer".into());
             uploads.fail(id, CaptureFailure::NoRenderer { path: name(), reason });
-            return Ok(Self { shown, next: None });
+            return Ok(Self { shown, next: None, file: None });
         };
+        if let Some((index, number)) = uploads.file_of(id) {
+            let file = Some(ChunkFile::new(index, number, source));
+            return Ok(Self { shown: None, next: None, file });
+        }
         if source.scene().trained_with.uses_fov_sentinel() {
             warn!(
                 "{}: trained with the field-of-view sentinel of intrinsics cameras; drawn with each camera's true \
@@ -268,7 +330,7 @@ impl RenderAsset for GpuGaussianCapture {
                 None
             }
         };
-        Ok(Self { shown, next })
+        Ok(Self { shown, next, file: None })
     }
 
     fn unload_asset(id: AssetId<GaussianCapture>, (_, _, uploads, ..): &mut SystemParamItem<Self::Param>) {
@@ -296,9 +358,61 @@ pub(in crate::plugin::render) fn extract_upload_budget(
     *extracted = **budget;
 }
 
-/// Returns whether any capture is being uploaded.
+/// Returns whether any capture is being uploaded, or has pages for chunk files, which may go.
 pub(in crate::plugin::render) fn any_uploading(captures: Res<RenderAssets<GpuGaussianCapture>>) -> bool {
-    captures.iter().any(|(_, capture)| capture.next.is_some())
+    captures.iter().any(|(_, capture)| capture.bytes_left().is_some() || capture.has_pages())
+}
+
+/// Frees the pages of chunk files that are not loaded any more, and makes pages anew for what captures may have now.
+fn release_files(captures: &mut RenderAssets<GpuGaussianCapture>, uploads: &Uploads, to: &UploadTarget<'_>) {
+    let with_pages: Vec<_> = captures.iter().filter(|(_, capture)| capture.has_pages()).map(|(id, _)| id).collect();
+    for id in with_pages {
+        // Its files are other assets.
+        let Some(mut capture) = captures.remove(id) else { continue };
+        let is_loaded = |asset, number| {
+            let file = captures.get(asset).and_then(|capture| capture.file.as_ref());
+            file.is_some_and(|file| file.index == id && file.number == number)
+        };
+        let granted = uploads.granted(id);
+        let resized = capture.shown_mut().and_then(|shown| {
+            shown.change_files(to, granted.unwrap_or_default(), |capture, files, to| {
+                files.release(capture, is_loaded);
+                match granted {
+                    Some(_) => files.resize(capture, to),
+                    None => {
+                        files.close(capture);
+                        Ok(())
+                    }
+                }
+            })
+        });
+        if let Some(Err(failure)) = resized {
+            warn_once_each(&format!("the memory of a capture in chunk files stays as it is: {failure}"));
+        }
+        captures.insert(id, capture);
+    }
+}
+
+/// Continues the upload of a chunk file within a number of bytes. Returns the uploaded bytes.
+///
+/// # Errors
+/// When it is not a file of its capture, or the GPU has no memory for the pages.
+fn continue_file(
+    captures: &mut RenderAssets<GpuGaussianCapture>,
+    id: AssetId<GaussianCapture>,
+    uploads: &Uploads,
+    to: &UploadTarget<'_>,
+    bytes: u64,
+) -> Result<u64, GpuError> {
+    let Some(mut file) = captures.get_mut(id).and_then(|capture| capture.file.take()) else { return Ok(0) };
+    let index = captures.get_mut(file.index).and_then(GpuGaussianCapture::shown_mut);
+    let advanced = index.zip(uploads.granted(file.index)).and_then(|(shown, most_bytes)| {
+        shown.change_files(to, most_bytes, |capture, files, to| file.advance(id, capture, files, to, bytes))
+    });
+    if let Some(capture) = captures.get_mut(id) {
+        capture.file = Some(file);
+    }
+    advanced.unwrap_or(Ok(0))
 }
 
 /// Continues the uploads within the budget, captures with the fewest remaining bytes first, so that one shows soon.
@@ -313,17 +427,24 @@ pub(in crate::plugin::render) fn continue_uploads(
 ) {
     let _span = debug_span!("gs4d/upload").entered();
     let Some(renderer) = renderer else { return };
-    let mut waiting: Vec<_> = captures.iter_mut().filter(|(_, capture)| capture.next.is_some()).collect();
-    waiting.sort_unstable_by_key(|(_, capture)| capture.bytes_left());
+    let to = UploadTarget { device: device.wgpu_device(), queue: &queue, renderer: &renderer.0 };
+    release_files(&mut captures, &uploads, &to);
+    let mut waiting: Vec<_> = captures.iter().filter_map(|(id, capture)| Some((capture.bytes_left()?, id))).collect();
+    waiting.sort_unstable();
     let mut left = budget.bytes_per_frame.max(1);
-    for (id, capture) in waiting {
+    for (_, id) in waiting {
         if left == 0 {
             break;
         }
-        match capture.advance(device.wgpu_device(), &queue, &renderer, left) {
+        let Some(capture) = captures.get_mut(id) else { continue };
+        let advanced = match capture.file {
+            Some(_) => continue_file(&mut captures, id, &uploads, &to, left),
+            None => capture.advance(&to, left),
+        };
+        match advanced {
             Ok(written) => {
                 left = left.saturating_sub(written);
-                if capture.next.is_none() {
+                if captures.get(id).is_some_and(|capture| capture.bytes_left().is_none()) {
                     uploads.finish(id);
                 }
             }

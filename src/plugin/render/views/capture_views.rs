@@ -108,9 +108,9 @@ impl Drawn {
         lists: &'a ActiveLists,
     ) -> Option<Instance<'a>> {
         let capture = captures.get(self.asset)?.level(self.level)?;
-        // Levels of detail have no filter.
-        let list = if self.filtered && self.level == 0 { lists.placed.get(&self.entity) } else { None };
-        let active = list.map(|placed| &placed.list);
+        // Levels of detail have no filter. A capture in chunk files is drawn by its list.
+        let is_listed = self.level == 0 && (self.filtered || capture.paged_bytes().is_some());
+        let active = lists.placed.get(&self.entity).filter(|_| is_listed).map(|placed| &placed.list);
         Some(Instance { capture, active, view: self.view, appearance: self.appearance })
     }
 }

@@ -1,0 +1,359 @@
+//! A capture whose Gaussians are in chunk files, on the GPU.
+//!
+//! In: the table of the files, the first file, the bytes that the buffers may have. Out: buffers of as many pages, into
+//! which [`FileUpload`](super::FileUpload)s write files, and which are made anew for another number of bytes.
+
+use super::buffers;
+use super::gpu_capture::{Filter, GpuCapture, Part, next_id, per_part, settings};
+use super::page_buffers::{PageBuffer, PageKind};
+use super::pages::{Pages, PartListing, all_pages, most_listed};
+use crate::gaussian::harmonics::evaluated;
+use crate::renderer::device::GpuError;
+use crate::renderer::device::memory::catch_known;
+use crate::renderer::layout::{self, InstanceUniforms, PAGE};
+use crate::renderer::pipelines::Renderer;
+use crate::renderer::shaders::Storage;
+use crate::scene::packed::SHARED_RANGES;
+use crate::scene::{
+    ActiveSets, ChunkTable, ColorCodebooks, ColorDegrees, FilterKind, Form, RuntimeScene, TemporalFilter,
+};
+use std::ops::Range;
+use std::sync::Arc;
+
+/// The chunk files of a capture.
+#[derive(Debug, Clone, Copy)]
+pub struct ChunkFiles<'a> {
+    /// Their table.
+    pub table: &'a Arc<ChunkTable>,
+    /// The scene of the index, which has no Gaussians; `None` if it is not in memory any more.
+    pub index: Option<&'a RuntimeScene>,
+    /// The scene of one of the files.
+    pub first: &'a RuntimeScene,
+}
+
+/// The Gaussians of a capture in chunk files.
+#[derive(Debug)]
+pub(in crate::renderer) struct PagedGaussians {
+    pub(super) table: Arc<ChunkTable>,
+    pub(super) pages: Pages,
+    /// The buffers of each part: geometry, color, active sets if there is a filter.
+    pub(super) buffers: Vec<Vec<PageBuffer>>,
+    /// The buffer of the codebooks, if colors are coded.
+    codebooks: Option<wgpu::Buffer>,
+    /// Whether the sets of the filter are bits; `None` without a filter.
+    pub(super) has_bits: Option<bool>,
+    /// Bytes of a page as the table counts them, and those that are written.
+    page_bytes: u64,
+    pub(super) written_bytes: u64,
+    /// Gaussians of all files of the table.
+    all: u64,
+    /// What all files share.
+    shared: Shared,
+}
+
+/// What all chunk files of a capture share.
+#[derive(Debug, Clone, PartialEq)]
+struct Shared {
+    storage: Storage,
+    settings: InstanceUniforms,
+    /// The first ranges, of packed Gaussians.
+    ranges: Vec<[f32; 4]>,
+    codebooks: Option<Arc<ColorCodebooks>>,
+    interval: [f32; 2],
+    /// Number of segments of the filter; 0 without one.
+    segments: u32,
+    /// Whether it is a filter of windows.
+    is_window: bool,
+}
+
+impl Shared {
+    fn of(scene: &RuntimeScene) -> Self {
+        let ranges = match &scene.form {
+            Form::Sliced(_) => &[],
+            Form::Packed(packed) => &packed.ranges[..packed.ranges.len().min(SHARED_RANGES)],
+        };
+        Self {
+            storage: Storage::of(&scene.form),
+            settings: settings(scene, stride(scene)),
+            ranges: ranges.to_vec(),
+            codebooks: scene.form.coded_colors().map(|colors| colors.codebooks.clone()),
+            interval: scene.trained_with.time_interval,
+            segments: scene.filter.as_ref().map_or(0, |filter| filter.segments),
+            is_window: scene.filter.as_ref().is_some_and(|filter| filter.kind == FilterKind::Window),
+        }
+    }
+}
+
+/// Returns the number of four-vectors of color coefficients per Gaussian.
+fn stride(scene: &RuntimeScene) -> usize {
+    let ColorDegrees { degree, degree_t, .. } = scene.form.color_degrees();
+    (evaluated(degree, degree_t) * 3).div_ceil(4)
+}
+
+impl PagedGaussians {
+    /// Returns what is listed of each part in a segment.
+    pub(in crate::renderer) fn listing(&self, segment: u32) -> Vec<PartListing> {
+        self.pages.listing(segment)
+    }
+
+    /// Returns a number that changes with the files that can be drawn.
+    pub(in crate::renderer) fn version(&self) -> u64 {
+        self.pages.version()
+    }
+
+    /// Returns the number of Gaussians of all files of the table.
+    pub(in crate::renderer) fn all(&self) -> u64 {
+        self.all
+    }
+
+    /// Returns the number of pages.
+    pub(in crate::renderer) fn count(&self) -> u32 {
+        self.pages.count()
+    }
+
+    /// Checks that a scene is a file of this capture.
+    ///
+    /// # Errors
+    /// A description of the first part that does not fit.
+    pub(super) fn check(&self, file: usize, scene: &RuntimeScene) -> Result<(), GpuError> {
+        scene.check().map_err(GpuError::Scene)?;
+        let most = self.table.files.get(file).map_or(0, |chunk| chunk.gaussians);
+        if scene.len() as u64 > most {
+            return Err(GpuError::Scene("it has more Gaussians than the index of the chunk files says"));
+        }
+        if Shared::of(scene) != self.shared {
+            return Err(GpuError::Scene("its settings, ranges or codebooks are not those of the other chunk files"));
+        }
+        Ok(())
+    }
+
+    /// Returns the filter of a file with sets as those of the other files, if it has others; `None` if it has the same.
+    ///
+    /// # Errors
+    /// When the sets are no intervals.
+    pub(super) fn converted(&self, filter: &TemporalFilter) -> Result<Option<TemporalFilter>, GpuError> {
+        let sets = match (self.has_bits, &filter.sets) {
+            (Some(true), ActiveSets::Intervals(_)) => ActiveSets::Bits(filter.to_bits()),
+            (Some(false), ActiveSets::Bits(_)) => {
+                let broken =
+                    GpuError::Scene("its temporal filter is not one of intervals, as in the other chunk files");
+                ActiveSets::Intervals(filter.to_intervals().ok_or(broken)?)
+            }
+            _ => return Ok(None),
+        };
+        Ok(Some(TemporalFilter { sets, ..filter.clone() }))
+    }
+
+    /// Takes pages for the Gaussians of a file. Returns `false` if too few are free.
+    pub(super) fn place(&mut self, file: usize, gaussians: usize, filter: Option<&TemporalFilter>) -> bool {
+        let Self { table, pages, .. } = self;
+        pages.place(file, gaussians, |own| match filter {
+            Some(filter) => filter.active_counts(own),
+            None => all_in_stretches(table, file, own),
+        })
+    }
+}
+
+/// Returns how many Gaussians of a file without a filter are listed in each stretch of time: all of its pages in its stretches.
+fn all_in_stretches(table: &ChunkTable, file: usize, own: Range<usize>) -> Vec<u32> {
+    let mut counts = vec![0; table.stretches as usize];
+    let stretches = table.files.get(file).map(|chunk| chunk.stretches.map(|stretch| stretch as usize));
+    if let Some([first, last]) = stretches
+        && let Some(counts) = counts.get_mut(first..=last)
+    {
+        counts.fill((own.len() as u32).next_multiple_of(PAGE));
+    }
+    counts
+}
+
+impl GpuCapture {
+    /// Returns the number of bytes of the buffers into which chunk files are written; `None` before the first file.
+    pub fn paged_bytes(&self) -> Option<u64> {
+        self.pages.as_ref().map(|paged| u64::from(paged.count()) * paged.page_bytes)
+    }
+
+    /// Returns whether a chunk file of so many Gaussians finds pages.
+    pub fn has_room(&self, gaussians: usize) -> bool {
+        self.pages.as_ref().is_some_and(|paged| paged.pages.has_room(gaussians))
+    }
+
+    /// Makes buffers for the chunk files of a capture, the index of which this is, of at most `bytes` and at least a page. All
+    /// files have the same settings, ranges and codebooks.
+    ///
+    /// # Errors
+    /// When a page is larger than the device can bind, the device has no memory for the buffers, the file is not one of the
+    /// index, or its Gaussians take more bytes than the table says.
+    pub fn open_pages(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        renderer: &Renderer,
+        files: ChunkFiles<'_>,
+        bytes: u64,
+    ) -> Result<(), GpuError> {
+        let ChunkFiles { table, index, first } = files;
+        first.check().map_err(GpuError::Scene)?;
+        let shared = Shared::of(first);
+        let Shared { segments, is_window, .. } = shared;
+        let of_index = index.map(|index| Shared { segments, is_window, ..Shared::of(index) });
+        if of_index.is_some_and(|of_index| of_index != shared) {
+            return Err(GpuError::Scene(
+                "its settings, ranges or codebooks are not those of the index of the chunk files",
+            ));
+        }
+        let allocator = renderer.allocator(device);
+        let mut kinds = PageKind::of_gaussians(&first.form, stride(first)).to_vec();
+        kinds.extend(first.filter.as_ref().map(PageKind::of_filter));
+        let own: u64 = kinds.iter().map(PageKind::page_bytes).sum();
+        let page_bytes = u64::from(table.gaussian_bytes) * u64::from(PAGE);
+        if own > page_bytes {
+            return Err(GpuError::Scene("its Gaussians take more bytes than the index of the chunk files says"));
+        }
+        let per_part = (per_part(&device.limits(), first, stride(first))? / PAGE as usize) as u32;
+        let pages = Pages::new(pages_within(table, page_bytes, bytes), per_part);
+        let of_part = |pages: u32| kinds.iter().map(|kind| PageBuffer::new(allocator, *kind, pages)).collect();
+        let create = || pages.of_parts().map(of_part).collect::<Vec<Vec<PageBuffer>>>();
+        let buffers = catch_known(device, u64::from(pages.count()) * own, create)?;
+        for buffer in buffers.iter().flatten() {
+            buffer.write_shared(queue, &shared.ranges);
+        }
+        let codebooks = first.form.coded_colors().map(|colors| {
+            let (buffer, filling) = renderer.codebooks.claim(allocator, colors);
+            if let Some(mut filling) = filling {
+                let mut chunk = Vec::new();
+                while filling.bytes_left() > 0 {
+                    renderer.work().add_uploaded(filling.fill(queue, first, u64::MAX, &mut chunk));
+                }
+            }
+            buffer
+        });
+        let has_bits = first.filter.as_ref().map(|filter| matches!(filter.sets, ActiveSets::Bits(_)));
+        let paged = PagedGaussians {
+            table: table.clone(),
+            pages,
+            buffers,
+            codebooks,
+            has_bits,
+            page_bytes,
+            written_bytes: own,
+            all: table.files.iter().map(|file| file.gaussians).sum(),
+            shared,
+        };
+        self.set_pages(device, renderer, paged);
+        Ok(())
+    }
+
+    /// Makes the buffers for chunk files anew, of at most `bytes`, and copies the files into them. Returns `false`, and
+    /// changes nothing, if there are as many pages already, or files do not fit yet, or while a file is being written.
+    ///
+    /// # Errors
+    /// When the device has no memory for the buffers. Nothing changes.
+    pub fn resize_pages(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        renderer: &Renderer,
+        bytes: u64,
+    ) -> Result<bool, GpuError> {
+        let Some(paged) = &self.pages else { return Ok(false) };
+        let count = pages_within(&paged.table, paged.page_bytes, bytes);
+        let moved = (count != paged.count()).then(|| paged.pages.moved(count)).flatten();
+        let (Some((pages, moves)), Some(first)) = (moved, paged.buffers.first()) else { return Ok(false) };
+        let allocator = renderer.allocator(device);
+        let of_part = |pages: u32| first.iter().map(|buffer| buffer.another(allocator, pages)).collect();
+        let create = || pages.of_parts().map(of_part).collect::<Vec<Vec<PageBuffer>>>();
+        let buffers = catch_known(device, u64::from(count) * paged.written_bytes, create)?;
+        for buffer in buffers.iter().flatten() {
+            buffer.write_shared(queue, &paged.shared.ranges);
+        }
+        let label = wgpu::CommandEncoderDescriptor { label: Some("gs4d pages") };
+        let mut encoder = device.create_command_encoder(&label);
+        let parts = |[from, to]: [u32; 2]| (paged.pages.local(from).0, pages.local(to).0);
+        for run in moves.chunk_by(|a, b| parts(*a) == parts(*b)) {
+            let (from, to) = parts(run[0]);
+            let local: Vec<[u32; 2]> =
+                run.iter().map(|[from, to]| [paged.pages.local(*from).1, pages.local(*to).1]).collect();
+            for (from, to) in paged.buffers[from].iter().zip(&buffers[to]) {
+                from.copy(&mut encoder, to, &local);
+            }
+        }
+        queue.submit([encoder.finish()]);
+        if let Some(paged) = self.pages.take() {
+            self.set_pages(device, renderer, PagedGaussians { pages, buffers, ..paged });
+        }
+        Ok(true)
+    }
+
+    /// Takes over the pages of another upload of the same capture, with the files in them.
+    pub fn take_pages(&mut self, from: &mut Self) {
+        if from.pages.is_some() {
+            let (environment, own) = (from.environment_bytes(), self.environment_bytes());
+            (self.storage, self.settings, self.id) = (from.storage, from.settings, next_id());
+            self.parts = std::mem::take(&mut from.parts);
+            (self.filter, self.pages) = (from.filter.take(), from.pages.take());
+            (self.len, self.bytes, self.bounds) = (from.len, from.bytes - environment + own, from.bounds);
+            from.close_pages();
+        }
+    }
+
+    /// Frees the buffers of chunk files.
+    pub fn close_pages(&mut self) {
+        self.parts.clear();
+        (self.filter, self.pages, self.bounds) = (None, None, None);
+        (self.len, self.bytes, self.id) = (0, self.environment_bytes(), next_id());
+    }
+
+    fn environment_bytes(&self) -> u64 {
+        self.environment.as_ref().map_or(0, |map| map.buffer.size())
+    }
+
+    /// Removes a chunk file, if it is there. Its pages are free.
+    pub fn remove_file(&mut self, file: usize) {
+        if let Some(paged) = &mut self.pages {
+            paged.pages.remove(file);
+            self.len = paged.pages.gaussians();
+        }
+    }
+
+    /// Makes the bind groups of pages, which replace those of before. Lists of them are no longer valid.
+    fn set_pages(&mut self, device: &wgpu::Device, renderer: &Renderer, paged: PagedGaussians) {
+        let (allocator, codebooks) = (renderer.allocator(device), paged.codebooks.as_slice());
+        let part = |(pages, buffers): (u32, &Vec<PageBuffer>)| {
+            let buffers: Vec<wgpu::Buffer> = buffers.iter().map(|own| own.buffer.clone()).collect();
+            let own = [&buffers[..2], &buffers[2..3], codebooks];
+            let mut part = Part::new(device, renderer, paged.shared.storage, pages * PAGE, own);
+            // Passes may not leave out a binding.
+            let sets = buffers.get(3).cloned().unwrap_or_else(|| buffers::storage(allocator, "gs4d no filter", 4));
+            let resources = [sets.as_entire_binding()];
+            part.filter = Some(allocator.bind_group("gs4d filter", &renderer.layouts.filter, &resources));
+            part
+        };
+        self.parts = paged.pages.of_parts().zip(&paged.buffers).map(part).collect();
+        let Shared { storage, settings, segments, is_window, interval, .. } = paged.shared;
+        (self.storage, self.settings, self.id) = (storage, settings, next_id());
+        let own: u64 = paged.buffers.iter().flatten().map(|own| own.buffer.size()).sum();
+        self.bytes = own + self.environment_bytes();
+        let segments = if segments == 0 { paged.table.stretches } else { segments };
+        let slots = u64::from(paged.count()) * u64::from(PAGE);
+        self.filter = Some(Filter {
+            mode: match paged.has_bits {
+                None => layout::FILTER_ALL,
+                Some(true) => layout::FILTER_BITS,
+                Some(false) => layout::FILTER_INTERVALS,
+            },
+            is_window,
+            segments,
+            interval,
+            counts: Vec::new(),
+            prefix_counts: Vec::new(),
+            bytes: 0,
+            most: most_listed(&paged.table, segments, paged.has_bits.is_none()).min(slots) as u32,
+        });
+        self.pages = Some(paged);
+    }
+}
+
+/// Returns the number of pages that buffers of so many bytes have for the files of a table: at least one.
+fn pages_within(table: &ChunkTable, page_bytes: u64, bytes: u64) -> u32 {
+    u32::try_from((bytes / page_bytes).min(all_pages(table))).unwrap_or(u32::MAX).max(1)
+}
