@@ -8,6 +8,7 @@ use bevy_gs4d::codec::package::WriteSettings;
 use bevy_gs4d::offline;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{SceneForm, Trained};
+use std::ffi::OsString;
 use std::fs;
 use std::path::PathBuf;
 use tempfile::TempDir;
@@ -65,6 +66,38 @@ fn progressive_packages_have_layers_that_can_be_drawn_early() {
         assert!((rate / expected - 1.0).abs() < 1e-6, "{rate}, not {expected} Mbit/s");
         assert!(text.contains(&format!("{rate:.1} Mbit/s")), "the bit rate is told: {text}");
     }
+}
+
+#[test]
+fn packed_captures_are_stored_in_another_order() {
+    let folder = folder();
+    let (input, packed) = (scene(&folder, "6000"), folder.path().join("packed.gs4d"));
+    let [out, chunks] = ["out.gs4d", "chunks"].map(|name| folder.path().join(name));
+    gs4d(&arguments!["compress", &input, &packed, "--verify", "0", "--codebooks", "64"]).text();
+    let reordered = |options: &[OsString]| {
+        let fixed =
+            arguments!["compress", &packed, &out, "--verify", "1", "--size", "64x48", "--engine", "cpu", "--json"];
+        gs4d(&[fixed.as_slice(), options].concat())
+    };
+    for options in [&arguments!["--progressive"][..], &arguments!["--chunk", "0.25"]] {
+        let report = reordered(options).json();
+        let psnr = report["psnr_to_original"][0].as_f64().expect("one view");
+        assert!(psnr > 60.0, "{options:?}: {psnr} dB to the packed capture");
+        assert_eq!(report["settings"].as_object().map(|own| own.len()), Some(1), "only the order: {report}");
+        let info = gs4d(&arguments!["info", &out, "--json"]).json();
+        let layers = match options {
+            [_] => info["package"]["layers"].as_array().map(|layers| layers.len() as u64),
+            _ => info["runs"]["layers"].as_u64(),
+        };
+        assert_eq!(layers, Some(3), "{options:?}: the layers: {info}");
+        let bytes = report["bytes_out"].as_f64().expect("the size") / report["bytes_in"].as_f64().expect("the size");
+        assert!(bytes < 1.25, "{options:?}: {bytes} of the size");
+    }
+    gs4d(&arguments!["split", &out, "-o", &chunks]).text();
+    let refused = "the scene is packed already";
+    reordered(&arguments!["--progressive", "--quality", "small"]).must_fail(refused);
+    reordered(&arguments!["--progressive", "--mean-bits", "9"]).must_fail(refused);
+    reordered(&[]).must_fail("--progressive or --chunk alone changes its order");
 }
 
 #[test]

@@ -1,8 +1,8 @@
 //! Packages of which only the beginning is there.
 //!
 //! In: synthetic packages, and the bundled captures, packed in layers. Out: proof that the beginning of a package is a
-//! package of its first layers, that each further layer is closer to the whole capture on the CPU, and that larger and
-//! more opaque Gaussians make up for those that are missing.
+//! package of its first layers, that the bundled island can be drawn early, that each further layer is closer to the
+//! whole capture on the CPU, and that larger and more opaque Gaussians make up for those that are missing.
 
 use crate::support::bundled::{BUNDLED, bundled, drawn, view_of};
 use crate::support::psnr::psnr;
@@ -11,7 +11,9 @@ use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{Form, GaussianScene, PackedColors, PackedScene, Packing, SceneForm};
 use bevy_gs4d::view::{Frame, Thinning, View};
 use glam::Vec3;
+use std::fs;
 use std::io::Cursor;
+use std::path::Path;
 
 /// Returns the package of a bundled capture in layers, and a view of it.
 fn layered(name: &str, up: Vec3) -> (Vec<u8>, View) {
@@ -152,4 +154,16 @@ fn layers_that_contradict_the_gaussians_are_refused() {
         let written = package::write(&mut Vec::new(), &wrong, &WriteSettings::default());
         assert!(matches!(written, Err(PackageError::Inconsistent(_))), "{layers:?}: {written:?}");
     }
+}
+
+#[test]
+fn the_bundled_island_can_be_drawn_after_two_fifths_of_its_bytes() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/island.gs4d");
+    let bytes = fs::read(path).expect("a bundled file");
+    let beginning = beginning(&bytes);
+    let (first, share) = (beginning.layers()[0], beginning.share(0));
+    assert!(5 * first <= 2 * bytes.len(), "after {first} of {} bytes", bytes.len());
+    assert!((0.2..0.3).contains(&share), "{share} of its Gaussians");
+    let coarse = beginning.package(&bytes[..first], 0).expect("the first layer is there");
+    assert!(package::read(Cursor::new(coarse)).is_ok(), "a package as any other");
 }

@@ -4,6 +4,7 @@
 
 use crate::offline::bake::BakeError;
 use crate::offline::collide::CollideError;
+use crate::offline::compress::CompressError;
 use crate::offline::dataset::{DatasetError, FrameProblem};
 use crate::offline::draw::DrawError;
 use crate::offline::engine::{EngineError, Purpose};
@@ -22,7 +23,7 @@ type AnyError = dyn Error + 'static;
 
 /// The remedies, a function for each type of error. It returns the remedy with the punctuation before it; `None` for
 /// errors of other types and errors without a remedy.
-const REMEDIES: [fn(&AnyError) -> Option<String>; 14] = [
+const REMEDIES: [fn(&AnyError) -> Option<String>; 15] = [
     of_engine,
     of_dataset,
     of_form,
@@ -35,6 +36,7 @@ const REMEDIES: [fn(&AnyError) -> Option<String>; 14] = [
     of_draw,
     of_footage,
     of_segments,
+    of_compress,
     of_collide,
     of_bake,
 ];
@@ -188,7 +190,7 @@ fn of_segments(error: &AnyError) -> Option<String> {
     let remedy = match error.downcast_ref::<SegmentsError>()? {
         SegmentsError::Packed { .. } => " (gs4d bake --quality lossless writes one)",
         SegmentsError::NoRuns { .. } | SegmentsError::OtherRuns { .. } => {
-            ": gs4d compress --chunk cuts the lossless capture that it was made from"
+            ": gs4d compress --chunk stores it in that order"
         }
         SegmentsError::Differs { what, .. } => of_shared(*what)?,
         SegmentsError::Still { .. } => " (gs4d convert --duration)",
@@ -198,6 +200,15 @@ fn of_segments(error: &AnyError) -> Option<String> {
         _ => return None,
     };
     Some(remedy.to_owned())
+}
+
+fn of_compress(error: &AnyError) -> Option<String> {
+    match error.downcast_ref::<CompressError>()? {
+        CompressError::AlreadyPacked => {
+            Some(" (gs4d compress with --progressive or --chunk alone changes its order)".to_owned())
+        }
+        _ => None,
+    }
 }
 
 fn of_collide(error: &AnyError) -> Option<String> {

@@ -11,7 +11,7 @@ use crate::cli::output::report::Report;
 use crate::cli::output::table::{Table, bytes};
 use crate::codec::package;
 use crate::offline::compress::{
-    CompressSettings, PackedOrder, Quality, broken_promises, compress_with, require_unpacked,
+    CompressSettings, PackedOrder, Quality, broken_promises, compress_with, reorder, require_unpacked,
 };
 use crate::offline::forms::convert::merge;
 use crate::offline::measure::SquaredError;
@@ -19,7 +19,7 @@ use crate::offline::measure::reference_pictures::ReferencePictures;
 use crate::offline::score::read_weights;
 use crate::offline::store::outputs::Files;
 use crate::offline::work::Progress;
-use crate::scene::{Bits, Form, RuntimeScene};
+use crate::scene::{Bits, Form, GaussianScene, RuntimeScene, SceneForm};
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -28,7 +28,8 @@ use std::path::PathBuf;
 /// Compress a capture: quantize its geometry, code its color, keep its temporal filter.
 ///
 /// OUT draws through the same passes; the GPU reads it as it is. Prune and mask first: a packed capture can no longer
-/// be scored.
+/// be scored. Of a capture that is packed already only the order can change, with --progressive or --chunk alone: its
+/// positions and velocities are rounded once more, and nothing else.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -36,6 +37,7 @@ Examples:
   gs4d compress chkpnt30000.pth small.gs4d --quality small --cameras transforms_test.json
   gs4d compress chkpnt30000.pth exact.gs4d --quality visually-lossless
   gs4d compress chkpnt30000.pth page.gs4d --progressive
+  gs4d compress capture.gs4d page.gs4d --progressive    # of a packed capture, only the order changes
   gs4d compress long.gs4d packed.gs4d --chunk 1, then gs4d split packed.gs4d -o chunks
   gs4d compress chkpnt30000.pth own.gs4d --codebooks 4096,4096 --scale-bits 10 --escape 0.05
 
@@ -154,14 +156,22 @@ impl Compress {
         if let Some(tolerance) = self.merge {
             merge(&mut scene, tolerance).map_err(|error| Failure::at(&self.input, &error))?;
         }
-        require_unpacked(&scene.form).map_err(|error| Failure::at(&self.input, &error))?;
+        let is_reordered = self.is_reordered(&scene);
+        if !is_reordered {
+            require_unpacked(&scene.form).map_err(|error| Failure::at(&self.input, &error))?;
+        }
         let scene = scene.into_runtime().map_err(|error| Failure::at(&self.input, &error))?;
         let weights = self.weights.as_ref().map(|path| read_weights(path, scene.len())).transpose()?;
         let originals = self.originals(&scene, progress)?;
         let settings = CompressSettings { weights, order: self.order.order(), ..self.knobs.settings(self.quality) };
-        progress.begin("codebooks", settings.codebooks.len());
-        let compressed = compress_with(scene, &settings, || progress.advance());
-        progress.finish();
+        let compressed = if is_reordered {
+            reorder(scene, &settings.order)
+        } else {
+            progress.begin("codebooks", settings.codebooks.len());
+            let compressed = compress_with(scene, &settings, || progress.advance());
+            progress.finish();
+            compressed
+        };
         let (scene, report) = compressed.map_err(|error| Failure::at(&self.input, &error))?;
         let after = self.package.save(&scene)?;
         let file = File::open(out).map_err(|error| Failure::at(out, &error))?;
@@ -201,7 +211,10 @@ impl Compress {
         }
         let psnr: Vec<f64> = errors.iter().map(SquaredError::psnr).collect();
         let all: SquaredError = errors.into_iter().collect();
-        let warnings = self.warnings(&scene, (!psnr.is_empty()).then(|| all.psnr()));
+        let warnings = match is_reordered {
+            true => Vec::new(),
+            false => self.warnings(&scene, (!psnr.is_empty()).then(|| all.psnr())),
+        };
         if let Some(lowest) = psnr.iter().copied().reduce(f64::min) {
             let (views, pooled) = (psnr.len(), all.psnr());
             text += &match all.is_identical() {
@@ -219,12 +232,21 @@ impl Compress {
             "gaussians": report.gaussians,
             "bytes_per_gaussian": each(after),
             "sections": sections,
-            "settings": settings,
+            "settings": if is_reordered { json!({ "order": settings.order }) } else { json!(settings) },
             "report": report,
             "psnr_to_original": psnr,
             "warnings": warnings,
         });
         Ok(Report::new(json, text))
+    }
+
+    /// Returns whether only the order of a packed scene changes: an order is given, and nothing that would change its values.
+    fn is_reordered(&self, scene: &GaussianScene) -> bool {
+        let settings = CompressSettings { order: self.order.order(), ..self.knobs.settings(self.quality) };
+        let plain = CompressSettings { order: settings.order.clone(), ..CompressSettings::from(Quality::default()) };
+        let is_alone = settings == plain && self.merge.is_none() && self.weights.is_none();
+        let is_packed = matches!(scene.form, SceneForm::Ready(Form::Packed(_)));
+        is_packed && is_alone && settings.order != PackedOrder::Spatial
     }
 
     /// Prints and returns the promises of the quality that the compressed scene does not keep; none if single options

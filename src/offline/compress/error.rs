@@ -13,6 +13,9 @@ pub enum CompressError {
     /// The scene is in the packed form already.
     #[error("the scene is packed already: name the checkpoint or the lossless package that it was made from")]
     AlreadyPacked,
+    /// The scene is not in the packed form.
+    #[error("the scene is not packed: compress it")]
+    NotPacked,
     /// Codebooks need quantized geometry.
     #[error("codebooks need quantized geometry: choose a quality other than lossless, or no codebooks")]
     CodebooksAlone,

@@ -8,6 +8,7 @@
 //! |---|---|
 //! | `settings` | how much may be lost: every option, and the qualities that select them |
 //! | `pack` | from a scene to its packed form |
+//! | `reorder` | from a packed scene to the same scene in another order |
 //! | `codebook`, `coded_colors` | training codebooks, and the colors of a scene by codebooks |
 //! | `roundings` | what packing changes of each Gaussian |
 //! | `promise` | what a quality promises, and whether a package keeps it |
@@ -17,6 +18,7 @@ mod coded_colors;
 mod error;
 mod pack;
 mod promise;
+mod reorder;
 pub(crate) mod roundings;
 mod settings;
 
@@ -25,5 +27,6 @@ pub use error::CompressError;
 pub use pack::{CompressReport, compress};
 pub(crate) use pack::{compress_tied, compress_with, require_unpacked};
 pub(crate) use promise::broken_promises;
+pub use reorder::reorder;
 pub(crate) use roundings::roundings;
 pub use settings::{CompressSettings, PackedOrder, Quality};

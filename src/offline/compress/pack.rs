@@ -10,14 +10,14 @@ use super::codebook::Centers;
 use super::coded_colors::coded_colors;
 use super::{CompressError, CompressSettings, PackedOrder};
 use crate::gaussian::Gaussian;
-use crate::offline::segments::{LEAST_PACKED, lives, parts};
+use crate::offline::segments::{Cut, LEAST_PACKED, lives, parts};
 use crate::scene::packed::MAX_STAGES;
 use crate::scene::packed::anchor::move_near;
 use crate::scene::packed::order::{Order, is_filler};
 use crate::scene::packed::pack::{encode_ordered, pack_ordered};
 use crate::scene::{
     ChunkTable, CodedColors, FilterKind, Form, GaussianScene, PackedColors, Packing, RuntimeScene, SceneForm, Sliced,
-    TrainedWith,
+    TemporalFilter, TrainedWith,
 };
 use ndarray::Array2;
 use serde::Serialize;
@@ -114,16 +114,28 @@ fn order_of(scene: &RuntimeScene, settings: &CompressSettings) -> Result<Order, 
     let (PackedOrder::Chunks(cut), Some(bits)) = (&settings.order, &settings.geometry) else {
         return Ok(Order::of(gaussians, settings.order == PackedOrder::Progressive));
     };
-    let stretches = cut.stretches(scene.playback.duration_seconds);
-    let stretches = stretches.ok_or(CompressError::ManyStretches { seconds: cut.seconds })?;
     // Lifespans are rounded, in any order in the same way: no Gaussian may be drawn outside the stretches of its file.
     let (every, no_colors) =
         ((0..gaussians.len() as u32).collect::<Vec<u32>>(), PackedColors::Coded(CodedColors::default()));
     let packed = encode_ordered(gaussians, &every, bits, no_colors, [0.0; 2], scene.trained_with.time_span());
     let rounded: Vec<Gaussian> = (0..packed.len()).map(|index| packed.gaussian(index)).collect();
-    // A support filter is computed again, from the lifespans.
-    let filter = scene.filter.as_ref().filter(|filter| filter.kind != FilterKind::Support);
-    let lives = lives(&rounded, filter, &scene.trained_with, stretches);
+    chunk_order(gaussians, &rounded, scene.filter.as_ref(), scene, cut)
+}
+
+/// Returns the order of chunk files, given the Gaussians and their filter, and the Gaussians as they are when they are
+/// packed. `scene` has the clock.
+pub(super) fn chunk_order(
+    gaussians: &[Gaussian],
+    rounded: &[Gaussian],
+    filter: Option<&TemporalFilter>,
+    scene: &RuntimeScene,
+    cut: &Cut,
+) -> Result<Order, CompressError> {
+    let stretches = cut.stretches(scene.playback.duration_seconds);
+    let stretches = stretches.ok_or(CompressError::ManyStretches { seconds: cut.seconds })?;
+    // A support filter follows from the lifespans.
+    let filter = filter.filter(|filter| filter.kind != FilterKind::Support);
+    let lives = lives(rounded, filter, &scene.trained_with, stretches);
     let parts = parts(gaussians, &lives, stretches, &cut.layers, LEAST_PACKED);
     match parts.len() > ChunkTable::MOST_FILES {
         true => Err(CompressError::ManyChunks { found: parts.len() }),

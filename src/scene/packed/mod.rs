@@ -14,6 +14,7 @@
 //! | `encode.rs`, `additional_bits.rs` | from Gaussians to records and ranges |
 //! | `decode.rs` | from records and ranges to Gaussians and colors |
 //! | `select.rs` | some of the Gaussians, without a change of their values |
+//! | `reorder.rs` | another order of the Gaussians of a packed scene |
 //! | `rounding.rs` | the change of a Gaussian by packing |
 //! | `coarseness.rs` | whether means are precise enough for the size of their Gaussians |
 //! | `shape.rs` | a covariance as scales and a rotation, and back |
@@ -31,6 +32,7 @@ mod lanes;
 mod morton;
 pub(crate) mod order;
 pub(crate) mod pack;
+mod reorder;
 mod rounding;
 pub(crate) mod runs;
 mod scene;
