@@ -13,8 +13,8 @@ use wgpu::BufferUsages;
 #[derive(Debug)]
 pub struct ActiveList {
     capture: u64,
-    /// Segment of the time prepared last, and version of the pages; `recorded`: whether the list of them has been recorded.
-    prepared: Option<(u32, u64)>,
+    /// Segments of the time prepared last, and version of the pages; `recorded`: whether the list of them has been recorded.
+    prepared: Option<([u32; 2], u64)>,
     recorded: bool,
     /// What is listed of each part of a capture in chunk files.
     listing: Vec<PartListing>,
@@ -61,12 +61,13 @@ impl ActiveList {
     /// is drawn.
     pub fn prepare(&mut self, queue: &wgpu::Queue, capture: &GpuCapture, time: f32) -> bool {
         let Some(filter) = &capture.filter else { return false };
-        let segment = filter.segment_of(time);
-        let wanted = (segment, capture.pages.as_ref().map_or(0, |paged| paged.version()));
+        let segments = filter.segments_around(time);
+        let segment = segments[0];
+        let wanted = (segments, capture.pages.as_ref().map_or(0, |paged| paged.version()));
         if self.prepared != Some(wanted) {
             self.prepared = Some(wanted);
             self.recorded = false;
-            self.listing = capture.pages.as_ref().map(|paged| paged.listing(segment)).unwrap_or_default();
+            self.listing = capture.pages.as_ref().map(|paged| paged.listing(segments)).unwrap_or_default();
             let pages: Vec<u32> = self.listing.iter().flat_map(|part| &part.pages).copied().collect();
             queue.write_buffer(&self.pages, 0, bytemuck::cast_slice(&pages));
             let (mut first, mut first_page) = (0, 0);
@@ -120,7 +121,7 @@ impl ActiveList {
     fn count(&self, filter: &Filter, part: usize, prefix: Option<usize>) -> u32 {
         match (self.listing.get(part), self.prepared) {
             (Some(listing), _) => listing.active,
-            (None, Some((segment, _))) => filter.count(part, segment, prefix),
+            (None, Some(([segment, _], _))) => filter.count(part, segment, prefix),
             (None, None) => 0,
         }
     }

@@ -813,6 +813,25 @@ fn pages_are_used_again_within_a_small_budget() {
 }
 
 #[test]
+fn files_that_the_game_has_loaded_itself_are_drawn() {
+    let Some(mut studio) = Studio::of(&SPLIT) else { return };
+    // The app is ready for updates.
+    testing::settle(&mut studio.app).expect("the app draws without an error");
+    let server = studio.app.world().resource::<AssetServer>().clone();
+    // As load_folder does.
+    let load = |file: usize| server.load(studio.folder.path().join(name(file)));
+    let loaded: Vec<Handle<GaussianCapture>> = needed(1.3).into_iter().map(load).collect();
+    let are_there = |app: &App| loaded.iter().all(|handle| captures(app).contains(handle));
+    wait_until(&mut studio.app, "the files", are_there, |app| run_frames(app, 1));
+    testing::settle(&mut studio.app).expect("the app draws without an error");
+    let entity = studio.spawn(ChunkTable::INDEX, 1.3, ());
+    let streamed = studio.shot(&[(entity, 1.3)]);
+    studio.app.world_mut().despawn(entity);
+    let whole = studio.pictures(JOINED, &[1.3]);
+    check_picture(&streamed, &whole[0], "files that were loaded before");
+}
+
+#[test]
 fn entities_of_one_stream_show_their_own_times() {
     let Some(mut studio) = Studio::of(&SPLIT) else { return };
     let times = [[0.3, LATE], [LATE, 0.3], [LATE, LATE]];

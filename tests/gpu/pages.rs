@@ -112,7 +112,7 @@ impl Files {
         let before = capture.len();
         while !upload.is_complete(capture) {
             assert_eq!(capture.len(), before, "file {file} is drawn once it is complete");
-            let written = upload.advance(&headless.context().queue, headless.renderer(), capture, 30_000);
+            let written = upload.advance(&headless.context().queue, headless.renderer(), capture, 30_000)?;
             assert!(written > 0, "every step uploads something");
         }
         assert_eq!(capture.len(), before + self.files[file].len(), "file {file} is drawn");

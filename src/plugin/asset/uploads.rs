@@ -27,8 +27,11 @@ pub(super) struct UploadStates {
     streams: HashSet<AssetId<GaussianCapture>>,
     /// Of which capture a chunk file is, and its number.
     files: HashMap<AssetId<GaussianCapture>, (AssetId<GaussianCapture>, usize)>,
-    /// The bytes that the Gaussians of captures in chunk files may take on the GPU.
+    /// Of these files, those that are in the pages of their capture.
+    placed: HashSet<AssetId<GaussianCapture>>,
+    /// The bytes that the Gaussians of captures in chunk files may take on the GPU, and those of their pages.
     granted: HashMap<AssetId<GaussianCapture>, u64>,
+    paged: HashMap<AssetId<GaussianCapture>, u64>,
     pub(super) failures: HashMap<AssetId<GaussianCapture>, UploadFailure>,
 }
 
@@ -90,6 +93,7 @@ impl Uploads {
         let mut states = self.lock();
         states.streams.remove(&index);
         states.granted.remove(&index);
+        states.paged.remove(&index);
     }
 
     /// Records the bytes that the Gaussians of a capture in chunk files may take on the GPU.
@@ -100,6 +104,34 @@ impl Uploads {
     /// Returns the bytes that the Gaussians of a capture in chunk files may take on the GPU; `None` if it is not streamed.
     pub(crate) fn granted(&self, index: AssetId<GaussianCapture>) -> Option<u64> {
         self.lock().granted.get(&index).copied()
+    }
+
+    /// Records the bytes of the pages of a capture in chunk files.
+    pub(crate) fn set_paged(&self, index: AssetId<GaussianCapture>, bytes: u64) {
+        self.lock().paged.insert(index, bytes);
+    }
+
+    /// Returns the bytes of the pages of a capture in chunk files; `None` before its first file.
+    pub(crate) fn paged(&self, index: AssetId<GaussianCapture>) -> Option<u64> {
+        self.lock().paged.get(&index).copied()
+    }
+
+    /// Records whether a chunk file is in the pages of its capture.
+    pub(crate) fn set_placed(&self, file: AssetId<GaussianCapture>, is_placed: bool) {
+        let mut states = self.lock();
+        if is_placed {
+            states.placed.insert(file);
+        } else {
+            states.placed.remove(&file);
+        }
+    }
+
+    /// Returns whether a loaded file of a capture can be drawn: it is in the pages of this capture. Without a render world
+    /// that uploads captures, every loaded file counts.
+    pub(crate) fn is_placed(&self, file: AssetId<GaussianCapture>, index: AssetId<GaussianCapture>) -> bool {
+        let states = self.lock();
+        let is_own = states.files.get(&file).is_some_and(|(own, _)| *own == index);
+        !states.expected || is_own && states.placed.contains(&file)
     }
 
     /// Records that a capture that is being loaded is a chunk file of a capture, and its number.
@@ -146,6 +178,7 @@ impl Uploads {
         states.finished.remove(&capture);
         states.failures.remove(&capture);
         states.files.remove(&capture);
+        states.placed.remove(&capture);
     }
 
     pub(super) fn lock(&self) -> MutexGuard<'_, UploadStates> {

@@ -13,6 +13,6 @@ pub(crate) struct StreamedPicture {
     pub(crate) seconds: Option<f32>,
     /// The box around the Gaussians of that time, capture space.
     pub(crate) bounds: Option<Bounds>,
-    /// The typical extent of the Gaussians, capture units.
+    /// The typical extent of the Gaussians, the mean of the files, capture units.
     pub(crate) extent: f32,
 }

@@ -49,12 +49,15 @@ impl Showing {
     /// Returns what is drawn.
     fn picture(&self, stream: &Stream, index: &GaussianCapture, captures: &Assets<GaussianCapture>) -> StreamedPicture {
         let Some(shown) = self.shown else { return StreamedPicture::default() };
-        let files = stream.schedule.needed_at(shown.into()).filter_map(|file| captures.get(stream.resident(file)?));
-        files.fold(StreamedPicture { seconds: self.shown, ..StreamedPicture::default() }, |picture, file| {
-            let bounds = picture.bounds.into_iter().chain(file.bounds_at(seconds_of(file, index, shown)));
-            let extent = picture.extent.max(file.extent());
-            StreamedPicture { bounds: bounds.reduce(Bounds::union), extent, ..picture }
-        })
+        let (mut bounds, mut extents, mut all) = (None, 0.0, 0.0);
+        for number in stream.schedule.needed_at(shown.into()) {
+            let Some(file) = stream.resident(number).and_then(|handle| captures.get(handle)) else { continue };
+            let own = file.bounds_at(seconds_of(file, index, shown));
+            bounds = bounds.into_iter().chain(own).reduce(Bounds::union);
+            let gaussians = stream.schedule.table().files.get(number).map_or(0, |chunk| chunk.gaussians) as f32;
+            (extents, all) = (extents + gaussians * file.extent(), all + gaussians);
+        }
+        StreamedPicture { seconds: self.shown, bounds, extent: extents / f32::max(all, 1.0) }
     }
 }
 

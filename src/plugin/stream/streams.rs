@@ -26,7 +26,7 @@ use bevy::platform::time::Instant;
 use bevy::render::renderer::RenderDevice;
 use bevy::transform::components::GlobalTransform;
 use glam::Vec3;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
 
 /// Longer frames count as this long, in seconds: an app that was suspended gives its requests time to end.
@@ -70,6 +70,8 @@ pub(super) struct Stream {
     /// The codebooks of colors, which the index has for all files.
     codebooks: Option<Arc<ColorCodebooks>>,
     files: HashMap<usize, Handle<GaussianCapture>>,
+    /// Files that others had loaded, which are loaded again into pages.
+    reloaded: HashSet<usize>,
     /// Its share of the memory on the GPU, bytes.
     share: u64,
 }
@@ -77,7 +79,7 @@ pub(super) struct Stream {
 impl Stream {
     fn new(table: Arc<ChunkTable>, duration: f32, index: Option<AssetPath<'static>>) -> Self {
         let schedule = StreamSchedule::new(table, duration.into()).in_pages();
-        Self { schedule, index, codebooks: None, files: HashMap::new(), share: 0 }
+        Self { schedule, index, codebooks: None, files: HashMap::new(), reloaded: HashSet::new(), share: 0 }
     }
 
     /// Returns the handle of a file that is there.
@@ -99,9 +101,16 @@ impl Stream {
         OnTheWay { requests: self.schedule.requested(), host_bytes: self.schedule.host_bytes() }
     }
 
-    /// Tells the schedule of the files that have arrived or failed since the last frame.
-    fn notice(&mut self, now: f64, server: &AssetServer, captures: &Assets<GaussianCapture>, uploads: &Uploads) {
-        let Self { schedule, files, .. } = self;
+    /// Tells the schedule of the files of the index `own` that have arrived or failed since the last frame.
+    fn notice(
+        &mut self,
+        own: AssetId<GaussianCapture>,
+        now: f64,
+        server: &AssetServer,
+        captures: &Assets<GaussianCapture>,
+        uploads: &Uploads,
+    ) {
+        let Self { schedule, files, reloaded, .. } = self;
         files.retain(|&file, handle| {
             if schedule.state(file) != FileState::Requested {
                 return true;
@@ -123,8 +132,13 @@ impl Stream {
                 schedule.failed(file, now);
                 return false;
             }
-            if loaded.is_some() && !uploads.awaits(id) {
+            let is_uploaded = loaded.is_some() && !uploads.awaits(id);
+            if is_uploaded && uploads.is_placed(id, own) {
                 schedule.arrived(file);
+                reloaded.remove(&file);
+            } else if is_uploaded && reloaded.insert(file) {
+                // It was a capture by itself before it became a file of this one.
+                server.get_path(id).into_iter().for_each(|path| server.reload(path));
             }
             true
         });
@@ -141,7 +155,6 @@ impl Stream {
         uploads: &Uploads,
     ) {
         self.share = limits.gpu_bytes;
-        uploads.grant(id, self.share);
         let plan = self.schedule.plan(now, heads, limits);
         for file in plan.give_up {
             self.files.remove(&file);
@@ -242,8 +255,8 @@ pub(super) fn fetch_files(
         }
         stays
     });
-    for stream in streams.streams.values_mut() {
-        stream.notice(now, &server, &captures, &uploads);
+    for (id, stream) in &mut streams.streams {
+        stream.notice(*id, now, &server, &captures, &uploads);
     }
     let shares = shares(wanted.values().map(|(_, sight)| sight));
     // Those that are wanted, in the same order.
@@ -255,6 +268,9 @@ pub(super) fn fetch_files(
     ask_in_turns(most, &mut on_the_way, |number, OnTheWay { requests, host_bytes }| {
         let (id, stream, heads, share) = &mut asking[number];
         let gpu_bytes = (budget.gpu_bytes as f64 * *share) as u64;
+        uploads.grant(*id, gpu_bytes);
+        // Pages may lack the memory to grow.
+        let gpu_bytes = uploads.paged(*id).map_or(gpu_bytes, |bytes| bytes.min(gpu_bytes));
         let limits = StreamLimits { gpu_bytes, host_bytes, requests, ahead: budget.ahead_seconds.into() };
         stream.follow(*id, now, heads, &limits, &server, &uploads);
         stream.on_the_way()

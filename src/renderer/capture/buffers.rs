@@ -13,7 +13,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Largest number of bytes that are converted and written at once. It limits the memory of converted records on the host.
-const BYTES_AT_ONCE: u64 = 1 << 20;
+pub(super) const BYTES_AT_ONCE: u64 = 1 << 20;
 
 /// A buffer of records and the number of records written.
 #[derive(Debug)]

@@ -3,14 +3,13 @@
 //! In: the [`RuntimeScene`] of a file, and the number of bytes per step. Out: a [`GpuCapture`] that draws the file with the
 //! others. Until the file is complete, it has pages, and is not drawn.
 
+use super::buffers::BYTES_AT_ONCE;
 use super::gpu_capture::GpuCapture;
 use crate::renderer::device::GpuError;
+use crate::renderer::layout::PAGE;
 use crate::renderer::pipelines::Renderer;
 use crate::scene::{RuntimeScene, TemporalFilter};
 use std::borrow::Borrow;
-
-/// Largest number of bytes that are converted and written at once. It limits the memory of converted pages on the host.
-const BYTES_AT_ONCE: u64 = 1 << 20;
 
 /// An upload of a chunk file in progress. `S` is the scene of the file, or a pointer to it.
 #[derive(Debug)]
@@ -46,7 +45,7 @@ impl<S: Borrow<RuntimeScene>> FileUpload<S> {
     /// Returns the bytes that have not been uploaded.
     pub fn bytes_left(&self, capture: &GpuCapture) -> u64 {
         let paged = capture.pages.as_ref();
-        paged.map_or(0, |paged| (paged.pages.of(self.file).len() - self.done) as u64 * paged.written_bytes)
+        paged.map_or(0, |paged| paged.pages.of(self.file).len().saturating_sub(self.done) as u64 * paged.written_bytes)
     }
 
     /// Returns whether the file is drawn.
@@ -56,11 +55,24 @@ impl<S: Borrow<RuntimeScene>> FileUpload<S> {
 
     /// Uploads at most `bytes` of the remaining bytes, but at least a page. The file is drawn once it is complete. Returns
     /// the number of bytes uploaded: 0 if it was complete.
-    pub fn advance(&mut self, queue: &wgpu::Queue, renderer: &Renderer, capture: &mut GpuCapture, bytes: u64) -> u64 {
-        let Some(paged) = &mut capture.pages else { return 0 };
+    ///
+    /// # Errors
+    /// When the capture has no pages for the file any more.
+    pub fn advance(
+        &mut self,
+        queue: &wgpu::Queue,
+        renderer: &Renderer,
+        capture: &mut GpuCapture,
+        bytes: u64,
+    ) -> Result<u64, GpuError> {
+        let gone = GpuError::Scene("the pages of its capture are others now");
+        let Some(paged) = &mut capture.pages else { return Err(gone) };
         let (scene, mut written) = (self.scene.borrow(), 0);
         let filter = self.filter.as_ref().or(scene.filter.as_ref());
         let own = paged.pages.of(self.file).to_vec();
+        if own.len() != scene.len().div_ceil(PAGE as usize) {
+            return Err(gone);
+        }
         while self.done < own.len() {
             let most = bytes.saturating_sub(written) / paged.written_bytes;
             if most == 0 && written > 0 {
@@ -80,6 +92,6 @@ impl<S: Borrow<RuntimeScene>> FileUpload<S> {
             capture.len = paged.pages.gaussians();
         }
         renderer.work().add_uploaded(written);
-        written
+        Ok(written)
     }
 }

@@ -82,6 +82,9 @@ impl Part {
     }
 }
 
+/// Times within this part of a stretch of chunk files from its boundary belong to both stretches.
+const NEAR_BOUNDARY: f32 = 0.01;
+
 /// The data of a temporal filter that the host needs.
 #[derive(Debug)]
 pub(in crate::renderer) struct Filter {
@@ -129,6 +132,17 @@ impl Filter {
     /// Returns the segment of a time, in the capture's unit.
     pub(crate) fn segment_of(&self, time: f32) -> u32 {
         segment_of(time, self.interval, self.segments)
+    }
+
+    /// Returns the segment of a time, twice. Where there is no filter but the stretches of chunk files, returns both
+    /// stretches next to a boundary, which a player may round to the one or the other.
+    pub(crate) fn segments_around(&self, time: f32) -> [u32; 2] {
+        let [start, end] = self.interval;
+        let near = match self.mode {
+            layout::FILTER_ALL => (end - start) / self.segments.max(1) as f32 * NEAR_BOUNDARY,
+            _ => 0.0,
+        };
+        [-near, near].map(|near| self.segment_of(time + near))
     }
 
     /// Returns the number of active Gaussians of a part in a segment; of those in the prefix with an index, if there is

@@ -116,10 +116,6 @@ impl PageBuffer {
 
     /// Records the copy of pages into a buffer of the same kind: each from the first to the second.
     pub(super) fn copy(&self, encoder: &mut wgpu::CommandEncoder, to: &Self, pages: &[[u32; 2]]) {
-        let PageKind { kind, before, .. } = self.kind;
-        if before > 0 {
-            encoder.copy_buffer_to_buffer(&self.buffer, 0, &to.buffer, 0, (before * kind.size) as u64);
-        }
         for run in pages.chunk_by(|a, b| a[0] + 1 == b[0] && a[1] + 1 == b[1]) {
             let ([from, at], bytes) = (run[0], run.len() as u64 * self.kind.page_bytes());
             encoder.copy_buffer_to_buffer(

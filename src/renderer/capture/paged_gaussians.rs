@@ -38,8 +38,8 @@ pub(in crate::renderer) struct PagedGaussians {
     pub(super) pages: Pages,
     /// The buffers of each part: geometry, color, active sets if there is a filter.
     pub(super) buffers: Vec<Vec<PageBuffer>>,
-    /// The buffer of the codebooks, if colors are coded.
-    codebooks: Option<wgpu::Buffer>,
+    /// The codebooks and their buffer, if colors are coded.
+    codebooks: Option<(Arc<ColorCodebooks>, wgpu::Buffer)>,
     /// Whether the sets of the filter are bits; `None` without a filter.
     pub(super) has_bits: Option<bool>,
     /// Bytes of a page as the table counts them, and those that are written.
@@ -51,14 +51,13 @@ pub(in crate::renderer) struct PagedGaussians {
     shared: Shared,
 }
 
-/// What all chunk files of a capture share.
+/// What all chunk files of a capture share, besides codebooks.
 #[derive(Debug, Clone, PartialEq)]
 struct Shared {
     storage: Storage,
     settings: InstanceUniforms,
     /// The first ranges, of packed Gaussians.
     ranges: Vec<[f32; 4]>,
-    codebooks: Option<Arc<ColorCodebooks>>,
     interval: [f32; 2],
     /// Number of segments of the filter; 0 without one.
     segments: u32,
@@ -76,11 +75,24 @@ impl Shared {
             storage: Storage::of(&scene.form),
             settings: settings(scene, stride(scene)),
             ranges: ranges.to_vec(),
-            codebooks: scene.form.coded_colors().map(|colors| colors.codebooks.clone()),
             interval: scene.trained_with.time_interval,
             segments: scene.filter.as_ref().map_or(0, |filter| filter.segments),
             is_window: scene.filter.as_ref().is_some_and(|filter| filter.kind == FilterKind::Window),
         }
+    }
+}
+
+/// Returns the codebooks of a scene, if its colors are coded.
+fn codebooks_of(scene: &RuntimeScene) -> Option<&Arc<ColorCodebooks>> {
+    scene.form.coded_colors().map(|colors| &colors.codebooks)
+}
+
+/// Returns whether two captures have the same codebooks, which they usually share.
+fn are_same(a: Option<&Arc<ColorCodebooks>>, b: Option<&Arc<ColorCodebooks>>) -> bool {
+    match (a, b) {
+        (Some(a), Some(b)) => Arc::ptr_eq(a, b) || a == b,
+        (None, None) => true,
+        (Some(_), None) | (None, Some(_)) => false,
     }
 }
 
@@ -91,9 +103,9 @@ fn stride(scene: &RuntimeScene) -> usize {
 }
 
 impl PagedGaussians {
-    /// Returns what is listed of each part in a segment.
-    pub(in crate::renderer) fn listing(&self, segment: u32) -> Vec<PartListing> {
-        self.pages.listing(segment)
+    /// Returns what is listed of each part in segments, from the first to the last.
+    pub(in crate::renderer) fn listing(&self, segments: [u32; 2]) -> Vec<PartListing> {
+        self.pages.listing(segments)
     }
 
     /// Returns a number that changes with the files that can be drawn.
@@ -121,7 +133,8 @@ impl PagedGaussians {
         if scene.len() as u64 > most {
             return Err(GpuError::Scene("it has more Gaussians than the index of the chunk files says"));
         }
-        if Shared::of(scene) != self.shared {
+        let has_codebooks = are_same(codebooks_of(scene), self.codebooks.as_ref().map(|(codebooks, _)| codebooks));
+        if !has_codebooks || Shared::of(scene) != self.shared {
             return Err(GpuError::Scene("its settings, ranges or codebooks are not those of the other chunk files"));
         }
         Ok(())
@@ -148,10 +161,24 @@ impl PagedGaussians {
     pub(super) fn place(&mut self, file: usize, gaussians: usize, filter: Option<&TemporalFilter>) -> bool {
         let Self { table, pages, .. } = self;
         pages.place(file, gaussians, |own| match filter {
-            Some(filter) => filter.active_counts(own),
+            // Gaussians that are active outside the stretches of their file are not listed there: the table is the bound.
+            Some(filter) => within_stretches(table, file, filter.active_counts(own)),
             None => all_in_stretches(table, file, own),
         })
     }
+}
+
+/// Returns numbers of each segment of time, or 0 in segments that have none of the stretches of a file.
+fn within_stretches(table: &ChunkTable, file: usize, mut counts: Vec<u32>) -> Vec<u32> {
+    let [first, last] = table.files.get(file).map_or([1, 0], |chunk| chunk.stretches.map(u64::from));
+    let (stretches, segments) = (u64::from(table.stretches), counts.len() as u64);
+    for (segment, count) in (0..).zip(&mut counts) {
+        let own = segment * stretches / segments..=((segment + 1) * stretches).div_ceil(segments) - 1;
+        if *own.end() < first || *own.start() > last {
+            *count = 0;
+        }
+    }
+    counts
 }
 
 /// Returns how many Gaussians of a file without a filter are listed in each stretch of time: all of its pages in its stretches.
@@ -170,6 +197,11 @@ impl GpuCapture {
     /// Returns the number of bytes of the buffers into which chunk files are written; `None` before the first file.
     pub fn paged_bytes(&self) -> Option<u64> {
         self.pages.as_ref().map(|paged| u64::from(paged.count()) * paged.page_bytes)
+    }
+
+    /// Returns the largest number of Gaussians that the pages list at any time; `None` before the first file.
+    pub fn most_paged(&self) -> Option<usize> {
+        self.filter.as_ref().filter(|_| self.pages.is_some()).map(|filter| filter.most as usize)
     }
 
     /// Returns whether a chunk file of so many Gaussians finds pages.
@@ -192,11 +224,13 @@ impl GpuCapture {
         bytes: u64,
     ) -> Result<(), GpuError> {
         let ChunkFiles { table, index, first } = files;
+        table.check().map_err(GpuError::Scene)?;
         first.check().map_err(GpuError::Scene)?;
         let shared = Shared::of(first);
         let Shared { segments, is_window, .. } = shared;
         let of_index = index.map(|index| Shared { segments, is_window, ..Shared::of(index) });
-        if of_index.is_some_and(|of_index| of_index != shared) {
+        let has_codebooks = index.is_none_or(|index| are_same(codebooks_of(index), codebooks_of(first)));
+        if !has_codebooks || of_index.is_some_and(|of_index| of_index != shared) {
             return Err(GpuError::Scene(
                 "its settings, ranges or codebooks are not those of the index of the chunk files",
             ));
@@ -225,7 +259,7 @@ impl GpuCapture {
                     renderer.work().add_uploaded(filling.fill(queue, first, u64::MAX, &mut chunk));
                 }
             }
-            buffer
+            (colors.codebooks.clone(), buffer)
         });
         let has_bits = first.filter.as_ref().map(|filter| matches!(filter.sets, ActiveSets::Bits(_)));
         let paged = PagedGaussians {
@@ -317,10 +351,11 @@ impl GpuCapture {
 
     /// Makes the bind groups of pages, which replace those of before. Lists of them are no longer valid.
     fn set_pages(&mut self, device: &wgpu::Device, renderer: &Renderer, paged: PagedGaussians) {
-        let (allocator, codebooks) = (renderer.allocator(device), paged.codebooks.as_slice());
+        let codebooks = paged.codebooks.as_ref().map(|(_, buffer)| buffer.clone());
+        let allocator = renderer.allocator(device);
         let part = |(pages, buffers): (u32, &Vec<PageBuffer>)| {
             let buffers: Vec<wgpu::Buffer> = buffers.iter().map(|own| own.buffer.clone()).collect();
-            let own = [&buffers[..2], &buffers[2..3], codebooks];
+            let own = [&buffers[..2], &buffers[2..3], codebooks.as_slice()];
             let mut part = Part::new(device, renderer, paged.shared.storage, pages * PAGE, own);
             // Passes may not leave out a binding.
             let sets = buffers.get(3).cloned().unwrap_or_else(|| buffers::storage(allocator, "gs4d no filter", 4));
@@ -353,7 +388,10 @@ impl GpuCapture {
     }
 }
 
+/// Most pages of a capture: a thousand million Gaussians.
+const MOST_PAGES: u32 = 1 << 22;
+
 /// Returns the number of pages that buffers of so many bytes have for the files of a table: at least one.
 fn pages_within(table: &ChunkTable, page_bytes: u64, bytes: u64) -> u32 {
-    u32::try_from((bytes / page_bytes).min(all_pages(table))).unwrap_or(u32::MAX).max(1)
+    u32::try_from((bytes / page_bytes).min(all_pages(table))).map_or(MOST_PAGES, |pages| pages.clamp(1, MOST_PAGES))
 }

@@ -99,7 +99,8 @@ impl Pages {
     fn take(&mut self, needed: usize) -> Option<Vec<u32>> {
         let parts = self.count.div_ceil(self.per_part);
         let of_part = |part: u32| self.free.range(part * self.per_part..(part + 1).saturating_mul(self.per_part));
-        let one = (0..parts).find(|part| parts == 1 || of_part(*part).count() >= needed);
+        let has_enough = |part: &u32| needed == 0 || of_part(*part).nth(needed - 1).is_some();
+        let one = (0..parts).find(|part| parts == 1 || has_enough(part));
         let pages: Vec<u32> = match one {
             Some(part) => of_part(part).copied().take(needed).collect(),
             None => self.free.iter().copied().take(needed).collect(),
@@ -144,13 +145,13 @@ impl Pages {
         }
     }
 
-    /// Returns the pages with active Gaussians of a segment, for each part.
-    pub(in crate::renderer) fn listing(&self, segment: u32) -> Vec<PartListing> {
+    /// Returns the pages with active Gaussians of any of these segments, for each part, and the largest number that are
+    /// active in one of them.
+    pub(in crate::renderer) fn listing(&self, segments: [u32; 2]) -> Vec<PartListing> {
         let mut parts = vec![PartListing::default(); self.count.div_ceil(self.per_part) as usize];
         for file in self.files.values().filter(|file| file.is_filled) {
             for piece in &file.pieces {
-                let active = (segment as usize).checked_sub(piece.first).and_then(|at| piece.active.get(at));
-                let active = active.copied().unwrap_or_default();
+                let active = piece.most_active(segments.map(|segment| segment as usize));
                 if active > 0 {
                     let part = &mut parts[piece.part as usize];
                     part.pages.extend(file.pages[piece.pages.clone()].iter().map(|page| page % self.per_part));
@@ -164,10 +165,16 @@ impl Pages {
     /// Returns the files in other pages, and the pages of all of them here and there. `None` while a file is being written,
     /// and if there is too little room: a file may be in several parts neither here nor there.
     pub(super) fn moved(&self, count: u32) -> Option<(Self, Vec<[u32; 2]>)> {
+        // This is asked in each frame until it can be.
+        let is_movable = |file: &PagedFile| file.is_filled && file.pieces.len() == 1;
+        let in_use = self.count as usize - self.free.len();
+        if in_use > count as usize || !self.files.values().all(is_movable) {
+            return None;
+        }
         let (mut to, mut moves) = (Self::new(count, self.per_part), Vec::new());
         for (&number, file) in &self.files {
             let [piece] = &file.pieces[..] else { return None };
-            let pages = to.take(file.pages.len()).filter(|_| file.is_filled)?;
+            let pages = to.take(file.pages.len())?;
             let part = pages[0] / self.per_part;
             if pages.iter().any(|page| page / self.per_part != part) {
                 return None;
@@ -188,6 +195,13 @@ impl Piece {
         let end = counts.iter().rposition(|count| *count > 0).map_or(first, |last| last + 1);
         Self { part, pages, first, active: counts[first..end].to_vec() }
     }
+
+    /// Returns the largest number of active Gaussians of the segments from the first to the last.
+    fn most_active(&self, [first, last]: [usize; 2]) -> u32 {
+        let end = (last + 1).saturating_sub(self.first).min(self.active.len());
+        let own = first.saturating_sub(self.first).min(end)..end;
+        self.active[own].iter().copied().max().unwrap_or_default()
+    }
 }
 
 /// Returns the number of pages of all files of a capture.
@@ -195,8 +209,8 @@ pub(super) fn all_pages(table: &ChunkTable) -> u64 {
     table.files.iter().map(|file| file.gaussians.div_ceil(PAGE.into())).sum()
 }
 
-/// Returns the largest number of Gaussians that the files of a capture list in any of `segments` segments, in whole pages
-/// if `in_pages`.
+/// Returns the largest number of Gaussians that the files of a capture list in any of `segments` segments; if `in_pages`, in
+/// whole pages, and in any two segments that follow each other.
 pub(super) fn most_listed(table: &ChunkTable, segments: u32, in_pages: bool) -> u64 {
     let (stretches, segments) = (u64::from(table.stretches.max(1)), u64::from(segments.max(1)));
     let size = |gaussians: u64| if in_pages { gaussians.next_multiple_of(PAGE.into()) } else { gaussians };
@@ -218,7 +232,8 @@ pub(super) fn most_listed(table: &ChunkTable, segments: u32, in_pages: bool) -> 
     sum_up(&mut ended);
     // Of a segment that several stretches have, the files of all of them.
     let of_segment = |segment: u64| {
-        let (first, last) = (segment * stretches / segments, ((segment + 1) * stretches).div_ceil(segments) - 1);
+        let after = (segment + if in_pages { 2 } else { 1 }).min(segments);
+        let (first, last) = (segment * stretches / segments, (after * stretches).div_ceil(segments) - 1);
         begun[last as usize] - ended[first as usize]
     };
     (0..segments).map(of_segment).max().unwrap_or_default()
@@ -242,16 +257,17 @@ mod tests {
     fn pages_are_listed_in_the_order_of_files_once_these_are_written() {
         let mut pages = Pages::new(8, 8);
         assert!(pages.place(5, 300, all_in(0..4)) && pages.place(2, 256, all_in(3..8)), "three pages of eight");
-        assert_eq!(pages.listing(3), [listing(&[], 0)], "no file has been written");
+        assert_eq!(pages.listing([3; 2]), [listing(&[], 0)], "no file has been written");
         pages.fill(5);
         pages.fill(2);
-        assert_eq!(pages.listing(3), [listing(&[2, 0, 1], 556)], "file 2 comes before file 5");
+        assert_eq!(pages.listing([3; 2]), [listing(&[2, 0, 1], 556)], "file 2 comes before file 5");
+        assert_eq!(pages.listing([2, 4]), pages.listing([3; 2]), "of several segments, the pages of each");
         assert_eq!(
-            (pages.listing(0), pages.listing(7)),
+            (pages.listing([0; 2]), pages.listing([7; 2])),
             (vec![listing(&[0, 1], 300)], vec![listing(&[2], 256)]),
             "one"
         );
-        assert_eq!((pages.listing(8), pages.gaussians()), (vec![listing(&[], 0)], 556), "after the last segment");
+        assert_eq!((pages.listing([8; 2]), pages.gaussians()), (vec![listing(&[], 0)], 556), "after the last segment");
     }
 
     #[test]
@@ -282,7 +298,7 @@ mod tests {
         assert_eq!(pages.of(2), [2, 6, 7], "no part has room");
         (0..3).for_each(|file| pages.fill(file));
         let expected = [listing(&[0, 1, 2], 500 + 256), listing(&[0, 1, 2], 700), listing(&[0, 1], 264)];
-        assert_eq!(pages.listing(2), expected, "the Gaussians of each part");
+        assert_eq!(pages.listing([2; 2]), expected, "the Gaussians of each part");
         assert!(pages.moved(8).is_none(), "a file in two parts is not moved");
     }
 
@@ -295,8 +311,8 @@ mod tests {
         pages.remove(2);
         let (to, moves) = pages.moved(4).expect("there is room");
         assert_eq!(moves, [[2, 0], [3, 1], [0, 2], [1, 3]], "files 1 and 3");
-        assert_eq!(to.listing(2), [listing(&[0, 1], 300)], "file 1 in its new pages");
-        assert_eq!((to.listing(5), to.count()), (vec![listing(&[0, 1, 2, 3], 600)], 4), "both");
+        assert_eq!(to.listing([2; 2]), [listing(&[0, 1], 300)], "file 1 in its new pages");
+        assert_eq!((to.listing([5; 2]), to.count()), (vec![listing(&[0, 1, 2, 3], 600)], 4), "both");
         assert_ne!(to.version(), pages.version(), "lists of the old pages are stale");
         assert!(pages.moved(3).is_none(), "too little room");
     }
@@ -311,6 +327,6 @@ mod tests {
         assert_eq!(most_listed(&table, 8, false), 410, "two segments for each stretch");
         assert_eq!(most_listed(&table, 2, false), 715, "a segment for two stretches");
         assert_eq!(most_listed(&table, 3, false), 715, "a segment of a stretch and a third of the next");
-        assert_eq!(most_listed(&table, 4, true), 256 + 512 + 256, "in whole pages: the third stretch");
+        assert_eq!(most_listed(&table, 4, true), 256 + 512 + 256 + 512, "in whole pages: the last two stretches");
     }
 }

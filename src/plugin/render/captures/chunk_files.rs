@@ -1,10 +1,12 @@
 //! Chunk files on the GPU.
 //!
-//! In: chunk files that have been loaded, of which [`Uploads`](crate::plugin::asset::Uploads) knows the capture. Out: their
+//! In: chunk files that have been loaded, of which [`Uploads`] knows the capture. Out: their
 //! Gaussians in the pages of the buffers of that capture, until they are no longer loaded; what is known of all of them.
 
+use crate::plugin::asset::Uploads;
 use crate::plugin::component::GaussianCapture;
-use crate::renderer::{ChunkFiles, FileUpload, GpuCapture, GpuError, Renderer};
+use crate::renderer::device::memory::catch_known;
+use crate::renderer::{ChunkFiles, FileUpload, GpuCapture, GpuError, Renderer, ViewRenderer};
 use crate::scene::{Bounds, Importances, RuntimeScene};
 use bevy::asset::AssetId;
 use std::collections::BTreeMap;
@@ -54,7 +56,7 @@ impl ChunkFile {
         let mut upload = match progress {
             Progress::Waiting(source) => {
                 let scene = source.shared_scene();
-                files.remove(capture, self.number);
+                files.remove(capture, self.number, to.uploads);
                 if capture.paged_bytes().is_none() {
                     open(capture, &scene, to)?;
                 }
@@ -69,10 +71,12 @@ impl ChunkFile {
             Progress::Uploading(upload) => upload,
             Progress::Complete => return Ok(0),
         };
-        let written = upload.advance(to.queue, to.renderer, capture, bytes);
+        let needed = bytes.min(upload.bytes_left(capture));
+        let advance = || upload.advance(to.queue, to.renderer, capture, bytes);
+        let written = catch_known(to.device, needed, advance).flatten()?;
         self.bytes_left = upload.bytes_left(capture);
         if upload.is_complete(capture) {
-            files.complete(capture, self.number);
+            files.complete(capture, self.number, to.uploads);
         } else {
             self.progress = Progress::Uploading(upload);
         }
@@ -85,7 +89,12 @@ fn open(capture: &mut GpuCapture, first: &RuntimeScene, to: &Destination<'_>) ->
     let table = to.index.scene().chunks.as_ref().ok_or(GpuError::Scene("its index has no table of chunk files"))?;
     let index = (!to.index.is_released()).then(|| to.index.scene());
     let files = ChunkFiles { table, index, first };
-    capture.open_pages(to.device, to.queue, to.renderer, files, to.most_bytes)
+    capture.open_pages(to.device, to.queue, to.renderer, files, to.most_bytes)?;
+    let room = ViewRenderer::check_room(to.device, capture.most_paged().unwrap_or_default());
+    if room.is_err() {
+        capture.close_pages();
+    }
+    room
 }
 
 /// Where files are uploaded to.
@@ -97,6 +106,8 @@ pub(super) struct Destination<'a> {
     pub(super) index: &'a GaussianCapture,
     /// Bytes that its pages may take.
     pub(super) most_bytes: u64,
+    /// Is told which files are in pages.
+    pub(super) uploads: &'a Uploads,
 }
 
 /// The files in the pages of a capture.
@@ -129,15 +140,17 @@ impl PlacedFiles {
         self.files.insert(number, file);
     }
 
-    fn complete(&mut self, capture: &mut GpuCapture, number: usize) {
+    fn complete(&mut self, capture: &mut GpuCapture, number: usize, uploads: &Uploads) {
         if let Some(file) = self.files.get_mut(&number) {
             file.is_complete = true;
+            uploads.set_placed(file.asset, true);
         }
         self.note(capture);
     }
 
-    fn remove(&mut self, capture: &mut GpuCapture, number: usize) {
-        if self.files.remove(&number).is_some() {
+    fn remove(&mut self, capture: &mut GpuCapture, number: usize, uploads: &Uploads) {
+        if let Some(file) = self.files.remove(&number) {
+            uploads.set_placed(file.asset, false);
             capture.remove_file(number);
             self.note(capture);
         }
@@ -147,6 +160,7 @@ impl PlacedFiles {
     pub(super) fn release(
         &mut self,
         capture: &mut GpuCapture,
+        uploads: &Uploads,
         is_loaded: impl Fn(AssetId<GaussianCapture>, usize) -> bool,
     ) {
         let gone: Vec<usize> = self
@@ -156,7 +170,7 @@ impl PlacedFiles {
             .map(|(number, _)| *number)
             .collect();
         for number in gone {
-            self.remove(capture, number);
+            self.remove(capture, number, uploads);
         }
     }
 

@@ -95,7 +95,8 @@ pub(crate) fn extract_captures(
     extracted.0.clear();
     for (entity, capture, settings, playback, transform, visibility, fade, picture) in &captures {
         let Some(loaded) = assets.get(&capture.0) else { continue };
-        let picture = picture.copied().filter(|_| loaded.scene().chunks.is_some());
+        let is_streamed = loaded.scene().chunks.is_some();
+        let picture = is_streamed.then(|| picture.copied().unwrap_or_default());
         let bounds = picture.map_or_else(|| loaded.bounds_at(playback.time), |picture| picture.bounds);
         let center = |bounds: Bounds| transform.transform_point((bounds.min + bounds.max) / 2.0);
         let placed = ExtractedCapture {

@@ -99,6 +99,7 @@ impl ShownCapture {
     fn change_files<T>(
         &mut self,
         to: &UploadTarget<'_>,
+        uploads: &Uploads,
         most_bytes: u64,
         change: impl FnOnce(&mut GpuCapture, &mut PlacedFiles, &Destination<'_>) -> T,
     ) -> Option<T> {
@@ -106,7 +107,7 @@ impl ShownCapture {
         let capture = levels.first_mut()?;
         let UploadTarget { device, queue, renderer } = *to;
         let (before, index) = (capture.len(), &*source);
-        let changed = change(capture, files, &Destination { device, queue, renderer, index, most_bytes });
+        let changed = change(capture, files, &Destination { device, queue, renderer, index, most_bytes, uploads });
         if let Some(importances) = importances.first_mut().filter(|_| capture.len() != before) {
             *importances = files.importances();
         }
@@ -375,8 +376,8 @@ fn release_files(captures: &mut RenderAssets<GpuGaussianCapture>, uploads: &Uplo
         };
         let granted = uploads.granted(id);
         let resized = capture.shown_mut().and_then(|shown| {
-            shown.change_files(to, granted.unwrap_or_default(), |capture, files, to| {
-                files.release(capture, is_loaded);
+            shown.change_files(to, uploads, granted.unwrap_or_default(), |capture, files, to| {
+                files.release(capture, uploads, is_loaded);
                 match granted {
                     Some(_) => files.resize(capture, to),
                     None => {
@@ -388,6 +389,9 @@ fn release_files(captures: &mut RenderAssets<GpuGaussianCapture>, uploads: &Uplo
         });
         if let Some(Err(failure)) = resized {
             warn_once_each(&format!("the memory of a capture in chunk files stays as it is: {failure}"));
+        }
+        if let Some(bytes) = capture.capture().and_then(GpuCapture::paged_bytes) {
+            uploads.set_paged(id, bytes);
         }
         captures.insert(id, capture);
     }
@@ -405,9 +409,11 @@ fn continue_file(
     bytes: u64,
 ) -> Result<u64, GpuError> {
     let Some(mut file) = captures.get_mut(id).and_then(|capture| capture.file.take()) else { return Ok(0) };
-    let index = captures.get_mut(file.index).and_then(GpuGaussianCapture::shown_mut);
+    // An index that will be replaced keeps no files.
+    let index = captures.get_mut(file.index).filter(|index| index.next.is_none());
+    let index = index.and_then(GpuGaussianCapture::shown_mut);
     let advanced = index.zip(uploads.granted(file.index)).and_then(|(shown, most_bytes)| {
-        shown.change_files(to, most_bytes, |capture, files, to| file.advance(id, capture, files, to, bytes))
+        shown.change_files(to, uploads, most_bytes, |capture, files, to| file.advance(id, capture, files, to, bytes))
     });
     if let Some(capture) = captures.get_mut(id) {
         capture.file = Some(file);
