@@ -15,6 +15,9 @@
 //! `global_sort` and `tile_bins` have a design each: variants, pipelines, buffers, recording; `view` chooses the design of a frame, has the
 //! trait through which it asks the design, `ViewDesign`, and what every view has: sizes, uniforms, targets, statistics.
 //!
+//! The Gaussians of a capture in chunk files are in pages of its buffers, which files take and leave ([`FileUpload`]); its list has those of the
+//! files that are there, in their order, so that such a capture is drawn as one that is loaded whole.
+//!
 //! # Buffer capacity
 //!
 //! The number of pairs of a frame, and their distribution over bins, is known only on the GPU, after projection. The upper bound, a pair of

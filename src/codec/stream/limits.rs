@@ -19,11 +19,24 @@ pub struct StreamLimits {
     /// How far ahead of a player files are fetched, seconds of playing, at most [`MOST_AHEAD`](Self::MOST_AHEAD); NaN
     /// counts as 0. Default: 10.
     pub ahead: f64,
+    /// For each layer above 0, how many seconds later than layer 0 a file may come: with more, the first layer of what is
+    /// played later comes before the last layer of now. Less suits a link that is fast for the capture. Counts as at
+    /// least a millisecond. Default: [`LAYER_SECONDS`](Self::LAYER_SECONDS).
+    pub layer_seconds: f64,
 }
 
 impl StreamLimits {
     /// The farthest that files are fetched ahead of a player, seconds of playing.
     pub const MOST_AHEAD: f64 = 600.0;
+
+    /// Seconds that each layer may come later over a link whose throughput is not known.
+    pub const LAYER_SECONDS: f64 = 1.5;
+
+    /// Returns how much later each layer may come, within its bounds.
+    pub(super) fn seconds_of_layer(&self) -> f64 {
+        let layer_seconds = if self.layer_seconds.is_nan() { 0.0 } else { self.layer_seconds };
+        layer_seconds.clamp(1e-3, Self::MOST_AHEAD)
+    }
 
     /// Returns how far ahead of a player files are fetched, within its bounds.
     pub(super) fn ahead_seconds(&self) -> f64 {
@@ -33,7 +46,7 @@ impl StreamLimits {
 
 impl Default for StreamLimits {
     fn default() -> Self {
-        Self { gpu_bytes: 1 << 30, host_bytes: 512 << 20, requests: 4, ahead: 10.0 }
+        Self { gpu_bytes: 1 << 30, host_bytes: 512 << 20, requests: 4, ahead: 10.0, layer_seconds: Self::LAYER_SECONDS }
     }
 }
 
@@ -46,5 +59,7 @@ mod tests {
         let ahead = |ahead: f64| StreamLimits { ahead, ..StreamLimits::default() }.ahead_seconds();
         let given = [-1.0, 0.0, 3.0, 1e9, f64::INFINITY, f64::NEG_INFINITY, f64::NAN];
         assert_eq!(given.map(ahead), [0.0, 0.0, 3.0, 600.0, 600.0, 0.0, 0.0], "0 to 600 s");
+        let later = |layer_seconds: f64| StreamLimits { layer_seconds, ..StreamLimits::default() }.seconds_of_layer();
+        assert_eq!(given.map(later), [1e-3, 1e-3, 3.0, 600.0, 600.0, 1e-3, 1e-3], "1 ms to 600 s for each layer");
     }
 }

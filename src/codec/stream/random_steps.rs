@@ -6,7 +6,7 @@
 
 use super::course::Axis;
 use super::fixture::random_head;
-use super::urgency::{Demand, LAYER_SECONDS, Urgency};
+use super::urgency::{Demand, Urgency};
 use super::{FileState, Playhead, StreamLimits, StreamPlan, StreamSchedule};
 use crate::scene::random::Random;
 use crate::scene::{ChunkFile, ChunkTable};
@@ -103,7 +103,7 @@ impl Host {
 
     fn demand(&self) -> Demand {
         let axis = Axis::new(self.duration.into(), self.table.stretches);
-        Demand::new(&self.heads, axis, self.limits.ahead.clamp(0.0, 600.0))
+        Demand::new(&self.heads, axis, self.limits.ahead.clamp(0.0, 600.0), self.limits.layer_seconds)
     }
 
     fn urgency(&self, demand: &Demand, file: usize) -> Urgency {
@@ -137,6 +137,7 @@ impl Host {
             4 => limits.host_bytes = u64::MAX,
             5 => limits.requests = random.below(8),
             6 => limits.ahead = f64::from(random.in_range(-1.0, 20.0)),
+            7 => limits.layer_seconds = f64::from(random.in_range(0.01, 2.0)),
             _ => {}
         }
     }
@@ -277,7 +278,8 @@ impl Host {
         self.limits.gpu_bytes = (0..self.table.files.len()).map(|file| self.bytes(file)[0]).sum();
         self.settle();
         let demand = self.demand();
-        let longest = f64::from(self.table.files.iter().map(|file| file.layer).max().unwrap_or(0)) * LAYER_SECONDS;
+        let layers = self.table.files.iter().map(|file| file.layer).max().unwrap_or(0);
+        let longest = f64::from(layers) * self.limits.layer_seconds;
         for head in &self.heads {
             let coverage = self.schedule.coverage(head.seconds);
             assert!(coverage.is_whole() && coverage.is_coarse, "{coverage:?} of {head:?} within {:?}", self.limits);

@@ -412,8 +412,9 @@ fn tables_and_players_without_sense_have_plans() {
                 let b = wild[(number + 1) % wild.len()];
                 for turn in [Turn::Stop, Turn::Loop, Turn::Return] {
                     let head = Playhead { seconds: *a, velocity: b, range: [b, *a], turn, delay: *a };
+                    let (all, requests) = (u64::MAX, usize::MAX);
                     let limits =
-                        StreamLimits { gpu_bytes: u64::MAX, host_bytes: u64::MAX, requests: usize::MAX, ahead: *a };
+                        StreamLimits { gpu_bytes: all, host_bytes: all, requests, ahead: *a, layer_seconds: b };
                     for file in schedule.plan(*a, &[head, head], &limits).fetch {
                         schedule.arrived(file);
                     }

@@ -113,7 +113,7 @@ impl StreamSchedule {
     /// [failed](Self::failed).
     pub fn plan(&mut self, now: f64, heads: &[Playhead], limits: &StreamLimits) -> StreamPlan {
         self.pass_time(now);
-        let demand = Demand::new(heads, self.axis, limits.ahead_seconds());
+        let demand = Demand::new(heads, self.axis, limits.ahead_seconds(), limits.seconds_of_layer());
         let mut plan = StreamPlan::default();
         let requested = self.ledger.requested().iter().copied();
         let overdue: Vec<usize> = requested.filter(|file| self.is_overdue(*file)).collect();

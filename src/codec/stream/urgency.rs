@@ -9,8 +9,6 @@ use crate::scene::ChunkFile;
 use std::cmp::Ordering;
 use std::collections::BTreeSet;
 
-/// Seconds that a file may come later for each layer above 0.
-pub(super) const LAYER_SECONDS: f64 = 1.5;
 /// A file is only given up for one that is more urgent by this many seconds, so that two files of about the same
 /// urgency do not replace each other; for one of urgency 0, every file of a greater urgency is.
 const HYSTERESIS: f64 = 0.5;
@@ -21,6 +19,8 @@ pub(super) struct Demand {
     players: Vec<Player>,
     /// How far ahead files are fetched, seconds of playing.
     ahead: f64,
+    /// Seconds that a file may come later for each layer above 0.
+    layer_seconds: f64,
 }
 
 /// Where a player goes, and how many seconds later than it gets there it may have what it needs.
@@ -45,14 +45,15 @@ pub(super) struct Urgency {
 }
 
 impl Demand {
-    /// Returns what players need that look ahead as many seconds of playing.
-    pub(super) fn new(heads: &[Playhead], axis: Axis, ahead: f64) -> Self {
+    /// Returns what players need that look ahead as many seconds of playing; files may come `layer_seconds` later for each
+    /// layer above 0.
+    pub(super) fn new(heads: &[Playhead], axis: Axis, ahead: f64, layer_seconds: f64) -> Self {
         // NaN counts as 0.
         let player = |head: &Playhead| Player { course: Course::new(head, axis), delay: head.delay.max(0.0) };
         let mut players: Vec<Player> = heads.iter().map(player).collect();
         // Those of a crowd that plays in step.
         players.dedup();
-        Self { players, ahead }
+        Self { players, ahead, layer_seconds }
     }
 
     /// Returns the urgency of a file: that for the player that needs it first.
@@ -84,7 +85,7 @@ impl Demand {
 
     /// Returns the urgency of a file that is reached in some seconds, by a player with some delay.
     fn urgency_in(&self, reached_in: f64, delay: f64, file: usize, chunk: &ChunkFile) -> Urgency {
-        let next_use = reached_in + delay + LAYER_SECONDS * f64::from(chunk.layer);
+        let next_use = reached_in + delay + self.layer_seconds * f64::from(chunk.layer);
         Urgency { file, is_wanted: reached_in <= self.ahead, reached_in, next_use, layer: chunk.layer }
     }
 }
@@ -154,7 +155,7 @@ mod tests {
     /// Four stretches of a second.
     fn demand(heads: &[(f64, f64)], ahead: f64) -> Demand {
         let heads: Vec<Playhead> = heads.iter().map(|(seconds, velocity)| head(*seconds, *velocity, 0.0)).collect();
-        Demand::new(&heads, Axis::new(4.0, 4), ahead)
+        Demand::new(&heads, Axis::new(4.0, 4), ahead, 1.5)
     }
 
     fn head(seconds: f64, velocity: f64, delay: f64) -> Playhead {
@@ -170,6 +171,9 @@ mod tests {
         let demand = demand(&[(0.5, 1.0)], 10.0);
         let seconds = |first: u32, layer| demand.urgency(0, &file([first, 3], layer)).seconds();
         assert_eq!([seconds(0, 0), seconds(0, 1), seconds(0, 2), seconds(2, 1)], [0.0, 1.5, 3.0, 3.0], "urgencies");
+        let fast = Demand::new(&[head(0.5, 1.0, 0.0)], Axis::new(4.0, 4), 10.0, 0.1);
+        let seconds = |first: u32, layer| fast.urgency(0, &file([first, 3], layer)).seconds();
+        assert!(seconds(0, 3) < seconds(1, 0), "over a fast link, all layers of now before the next stretch");
     }
 
     #[test]
@@ -183,7 +187,7 @@ mod tests {
 
     #[test]
     fn a_player_with_a_delay_comes_after_the_others() {
-        let delayed = |delay| Demand::new(&[head(0.5, 0.0, delay), head(2.5, 1.0, 0.0)], Axis::new(4.0, 4), 0.0);
+        let delayed = |delay| Demand::new(&[head(0.5, 0.0, delay), head(2.5, 1.0, 0.0)], Axis::new(4.0, 4), 0.0, 1.5);
         let both = delayed(1e-3);
         let seconds = |stretch, layer| both.urgency(0, &file([stretch; 2], layer)).seconds();
         assert_eq!([seconds(0, 0), seconds(2, 0), seconds(2, 1)], [1e-3, 0.0, 1.5], "after layer 0 of the other");
@@ -238,7 +242,12 @@ mod tests {
                 .collect();
             let index = Intervals::new(files.iter().map(|file| file.stretches).enumerate());
             let heads: Vec<Playhead> = (0..random.below(4)).map(|_| random_head(&mut random, 4.0)).collect();
-            let demand = Demand::new(&heads, Axis::new(4.0, stretches), f64::from(random.in_range(0.0, 6.0)));
+            let demand = Demand::new(
+                &heads,
+                Axis::new(4.0, stretches),
+                f64::from(random.in_range(0.0, 6.0)),
+                f64::from(random.in_range(0.0, 2.0)),
+            );
             let all = files.iter().enumerate().map(|(number, file)| demand.urgency(number, file));
             let mut expected: Vec<Urgency> = all.filter(|urgency| urgency.is_wanted).collect();
             expected.sort_unstable();

@@ -106,9 +106,11 @@ impl Uploads {
         self.lock().granted.get(&index).copied()
     }
 
-    /// Records the bytes of the pages of a capture in chunk files.
-    pub(crate) fn set_paged(&self, index: AssetId<GaussianCapture>, bytes: u64) {
-        self.lock().paged.insert(index, bytes);
+    /// Records the bytes of the pages of all captures in chunk files.
+    pub(crate) fn set_paged(&self, all: impl Iterator<Item = (AssetId<GaussianCapture>, u64)>) {
+        let mut states = self.lock();
+        states.paged.clear();
+        states.paged.extend(all);
     }
 
     /// Returns the bytes of the pages of a capture in chunk files; `None` before its first file.
@@ -140,6 +142,11 @@ impl Uploads {
         if states.expected {
             states.files.insert(file, (index, number));
         }
+    }
+
+    /// Records that a capture is not wanted as a chunk file any more: its pages are free, even if it stays loaded.
+    pub(crate) fn leave(&self, file: AssetId<GaussianCapture>) {
+        self.lock().files.remove(&file);
     }
 
     /// Returns the capture of which a capture is a chunk file, and its number.
@@ -179,6 +186,7 @@ impl Uploads {
         states.failures.remove(&capture);
         states.files.remove(&capture);
         states.placed.remove(&capture);
+        states.paged.remove(&capture);
     }
 
     pub(super) fn lock(&self) -> MutexGuard<'_, UploadStates> {

@@ -9,6 +9,7 @@ use super::heads::{playhead, still};
 use super::settings::{CaptureStreamSettings, StreamBudget};
 use super::shares::{OnTheWay, Sight, ask_in_turns, shares};
 use super::state::CaptureStreamState;
+use super::throughput::Throughput;
 use crate::codec::stream::{FileState, Playhead, StreamLimits, StreamSchedule};
 use crate::plugin::asset::{CaptureFailure, CaptureLoaderSettings, Uploads};
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
@@ -38,12 +39,14 @@ pub(super) struct Streams {
     /// The time of schedules, seconds, and when it was that. It does not pass while the app stands still.
     now: f64,
     updated: Instant,
+    /// How fast files arrive, of all streams together.
+    throughput: Throughput,
     streams: BTreeMap<AssetId<GaussianCapture>, Stream>,
 }
 
 impl Default for Streams {
     fn default() -> Self {
-        Self { now: 0.0, updated: Instant::now(), streams: BTreeMap::new() }
+        Self { now: 0.0, updated: Instant::now(), throughput: Throughput::default(), streams: BTreeMap::new() }
     }
 }
 
@@ -74,12 +77,37 @@ pub(super) struct Stream {
     reloaded: HashSet<usize>,
     /// Its share of the memory on the GPU, bytes.
     share: u64,
+    /// Bytes of its files for each second of playing at speed 1.
+    bytes_per_second: f64,
+    /// Bytes of all its files on the GPU.
+    all_bytes: u64,
 }
 
 impl Stream {
     fn new(table: Arc<ChunkTable>, duration: f32, index: Option<AssetPath<'static>>) -> Self {
-        let schedule = StreamSchedule::new(table, duration.into()).in_pages();
-        Self { schedule, index, codebooks: None, files: HashMap::new(), reloaded: HashSet::new(), share: 0 }
+        let all_bytes = (0..table.files.len()).map(|file| table.page_bytes(file)).fold(0, u64::saturating_add);
+        let bytes_per_second = table.bytes_up_to(ChunkTable::MOST_LAYERS) as f64 / f64::from(duration);
+        Self {
+            schedule: StreamSchedule::new(table, duration.into()).in_pages(),
+            index,
+            codebooks: None,
+            files: HashMap::new(),
+            reloaded: HashSet::new(),
+            share: 0,
+            bytes_per_second,
+            all_bytes,
+        }
+    }
+
+    /// Returns the bytes per second that its players need.
+    fn needed(&self, heads: &[Playhead]) -> f64 {
+        self.bytes_per_second * heads.iter().map(|head| head.velocity.abs()).fold(1.0, f64::max)
+    }
+
+    /// Returns whether about all that is ahead of a player, and as much behind it, has room in so many bytes.
+    fn has_room(&self, gpu_bytes: u64, ahead: f32) -> bool {
+        let share = 2.0 * f64::from(ahead) / self.schedule.duration();
+        self.all_bytes as f64 * share.min(1.0) <= gpu_bytes as f64
     }
 
     /// Returns the handle of a file that is there.
@@ -101,7 +129,8 @@ impl Stream {
         OnTheWay { requests: self.schedule.requested(), host_bytes: self.schedule.host_bytes() }
     }
 
-    /// Tells the schedule of the files of the index `own` that have arrived or failed since the last frame.
+    /// Tells the schedule of the files of the index `own` that have arrived or failed since the last frame. Returns the
+    /// bytes of those that have arrived.
     fn notice(
         &mut self,
         own: AssetId<GaussianCapture>,
@@ -109,7 +138,8 @@ impl Stream {
         server: &AssetServer,
         captures: &Assets<GaussianCapture>,
         uploads: &Uploads,
-    ) {
+    ) -> u64 {
+        let mut bytes = 0;
         let Self { schedule, files, reloaded, .. } = self;
         files.retain(|&file, handle| {
             if schedule.state(file) != FileState::Requested {
@@ -117,7 +147,8 @@ impl Stream {
             }
             let id = handle.id();
             let loaded = captures.get(id);
-            let most = schedule.table().files.get(file).map_or(0, |chunk| chunk.gaussians);
+            let chunk = schedule.table().files.get(file).copied();
+            let most = chunk.map_or(0, |chunk| chunk.gaussians);
             // Its Gaussians are in memory until the end of the frame in which it is loaded.
             let count = loaded.map_or(0, |capture| capture.scene().len() as u64);
             if count > most {
@@ -136,12 +167,14 @@ impl Stream {
             if is_uploaded && uploads.is_placed(id, own) {
                 schedule.arrived(file);
                 reloaded.remove(&file);
+                bytes += chunk.map_or(0, |chunk| chunk.bytes);
             } else if is_uploaded && reloaded.insert(file) {
                 // It was a capture by itself before it became a file of this one.
                 server.get_path(id).into_iter().for_each(|path| server.reload(path));
             }
             true
         });
+        bytes
     }
 
     /// Loads and gives up files of the index `id`.
@@ -154,10 +187,9 @@ impl Stream {
         server: &AssetServer,
         uploads: &Uploads,
     ) {
-        self.share = limits.gpu_bytes;
         let plan = self.schedule.plan(now, heads, limits);
         for file in plan.give_up {
-            self.files.remove(&file);
+            self.files.remove(&file).into_iter().for_each(|handle| uploads.leave(handle.id()));
         }
         for file in plan.fetch {
             let Some(path) = self.path(file) else {
@@ -214,6 +246,7 @@ pub(super) fn fetch_files(
     mut streams: ResMut<Streams>,
 ) {
     let _span = debug_span!("gs4d/stream").entered();
+    let before = streams.now;
     let now = streams.pass_time();
     // The Gaussians of files were on the device only.
     let is_device_new = device.is_some_and(|device| device.is_changed());
@@ -255,9 +288,12 @@ pub(super) fn fetch_files(
         }
         stays
     });
-    for (id, stream) in &mut streams.streams {
-        stream.notice(*id, now, &server, &captures, &uploads);
-    }
+    let is_busy = streams.streams.values().any(|stream| stream.schedule.requested() > 0);
+    let notice = |(id, stream): (&_, &mut Stream)| stream.notice(*id, now, &server, &captures, &uploads);
+    let arrived = streams.streams.iter_mut().map(notice).sum();
+    let needed = streams.streams.values().zip(wanted.values()).map(|(stream, (heads, _))| stream.needed(heads)).sum();
+    streams.throughput.add(now - before, is_busy, arrived, needed);
+    let throughput = streams.throughput;
     let shares = shares(wanted.values().map(|(_, sight)| sight));
     // Those that are wanted, in the same order.
     let asking = streams.streams.values_mut().zip(&wanted).zip(shares);
@@ -269,9 +305,16 @@ pub(super) fn fetch_files(
         let (id, stream, heads, share) = &mut asking[number];
         let gpu_bytes = (budget.gpu_bytes as f64 * *share) as u64;
         uploads.grant(*id, gpu_bytes);
+        stream.share = gpu_bytes;
+        // Where memory is short, the first layer of what is played next comes before the last layer of now.
+        let layer_seconds = match stream.has_room(gpu_bytes, budget.ahead_seconds) {
+            true => throughput.layer_seconds(),
+            false => StreamLimits::LAYER_SECONDS,
+        };
         // Pages may lack the memory to grow.
         let gpu_bytes = uploads.paged(*id).map_or(gpu_bytes, |bytes| bytes.min(gpu_bytes));
-        let limits = StreamLimits { gpu_bytes, host_bytes, requests, ahead: budget.ahead_seconds.into() };
+        let ahead = budget.ahead_seconds.into();
+        let limits = StreamLimits { gpu_bytes, host_bytes, requests, ahead, layer_seconds };
         stream.follow(*id, now, heads, &limits, &server, &uploads);
         stream.on_the_way()
     });

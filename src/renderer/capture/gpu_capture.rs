@@ -5,9 +5,9 @@
 //! by one dispatch.
 
 use super::buffers::{self, Filling};
+use super::instance_settings::settings;
 use super::paged_gaussians::PagedGaussians;
 use super::prefixes::Prefixes;
-use crate::gaussian::ShDirection;
 use crate::gaussian::harmonics::evaluated;
 use crate::renderer::device::GpuError;
 use crate::renderer::device::memory::{Allocator, binding_limit};
@@ -15,8 +15,7 @@ use crate::renderer::layout::{self, BLOCK, InstanceUniforms};
 use crate::renderer::pipelines::Renderer;
 use crate::renderer::shaders::Storage;
 use crate::scene::filter::segment_of;
-use crate::scene::packed::MAX_STAGES;
-use crate::scene::{ActiveSets, Bounds, CodedColors, ColorDegrees, FilterKind, RuntimeScene, TemporalFilter};
+use crate::scene::{ActiveSets, Bounds, ColorDegrees, FilterKind, RuntimeScene, TemporalFilter};
 use glam::Vec4;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -334,26 +333,4 @@ pub(super) fn per_part(limits: &wgpu::Limits, scene: &RuntimeScene, stride: usiz
         0 => Err(GpuError::TooLarge { what: "the Gaussians", needed: record * u64::from(BLOCK), limit }),
         blocks => Ok(blocks * BLOCK as usize),
     }
-}
-
-/// Returns the color and time settings of a scene as uniforms, with zero in place of all others.
-pub(super) fn settings(scene: &RuntimeScene, stride: usize) -> InstanceUniforms {
-    let (trained_with, colors) = (&scene.trained_with, scene.form.coded_colors());
-    let ColorDegrees { degree, degree_t, .. } = scene.form.color_degrees();
-    InstanceUniforms {
-        degree,
-        degree_t: if degree == 3 { degree_t } else { 0 },
-        stride: colors.map_or(stride, buffers::entry_words) as u32,
-        stages: colors.map_or(0, |colors| colors.codebooks.entries.len() as u32),
-        first_entries: colors.map(first_entries).unwrap_or_default(),
-        displaced: u32::from(trained_with.sh_direction == ShDirection::Displaced),
-        time_span: trained_with.period_of_colors(),
-        marginal_cutoff: trained_with.marginal_cutoff,
-        ..bytemuck::Zeroable::zeroed()
-    }
-}
-
-/// Returns the index of the first entry of each codebook among all entries.
-fn first_entries(colors: &CodedColors) -> [u32; MAX_STAGES] {
-    std::array::from_fn(|stage| colors.codebooks.entries.iter().take(stage).sum())
 }

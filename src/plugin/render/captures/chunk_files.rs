@@ -40,6 +40,11 @@ impl ChunkFile {
         (!matches!(self.progress, Progress::Complete)).then_some(self.bytes_left)
     }
 
+    /// Uploads no more of the file: it is not wanted any more.
+    pub(super) fn abandon(&mut self) {
+        self.progress = Progress::Complete;
+    }
+
     /// Uploads at most `bytes` of the file `id` into the pages of `capture`, once there is room. Returns the uploaded bytes.
     ///
     /// # Errors
@@ -172,6 +177,11 @@ impl PlacedFiles {
         for number in gone {
             self.remove(capture, number, uploads);
         }
+    }
+
+    /// Records that the files are in no pages any more.
+    pub(super) fn forget(&self, uploads: &Uploads) {
+        self.files.values().for_each(|file| uploads.set_placed(file.asset, false));
     }
 
     /// Gives the capture the bounds of its files.

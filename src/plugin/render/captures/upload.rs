@@ -84,7 +84,7 @@ struct ShownCapture {
 
 impl ShownCapture {
     /// Keeps the chunk files of the version before, if the table of them is the same: they are not loaded again.
-    fn keep_files(&mut self, mut before: Self) {
+    fn keep_files(&mut self, mut before: Self, uploads: &Uploads) {
         let tables = self.source.scene().chunks.as_ref().zip(before.source.scene().chunks.as_ref());
         let levels = self.levels.first_mut().zip(before.levels.first_mut());
         if let Some((capture, from)) = levels.filter(|_| tables.is_some_and(|(table, other)| Arc::ptr_eq(table, other)))
@@ -92,6 +92,8 @@ impl ShownCapture {
             capture.take_pages(from);
             self.files = before.files;
             self.importances = before.importances;
+        } else {
+            before.files.forget(uploads);
         }
     }
 
@@ -99,13 +101,12 @@ impl ShownCapture {
     fn change_files<T>(
         &mut self,
         to: &UploadTarget<'_>,
-        uploads: &Uploads,
         most_bytes: u64,
         change: impl FnOnce(&mut GpuCapture, &mut PlacedFiles, &Destination<'_>) -> T,
     ) -> Option<T> {
         let Self { levels, importances, source, files } = self;
         let capture = levels.first_mut()?;
-        let UploadTarget { device, queue, renderer } = *to;
+        let UploadTarget { device, queue, renderer, uploads } = *to;
         let (before, index) = (capture.len(), &*source);
         let changed = change(capture, files, &Destination { device, queue, renderer, index, most_bytes, uploads });
         if let Some(importances) = importances.first_mut().filter(|_| capture.len() != before) {
@@ -121,6 +122,8 @@ struct UploadTarget<'a> {
     device: &'a wgpu::Device,
     queue: &'a wgpu::Queue,
     renderer: &'a Renderer,
+    /// Is told which files are in pages.
+    uploads: &'a Uploads,
 }
 
 /// A capture that is being uploaded.
@@ -226,7 +229,7 @@ impl GpuGaussianCapture {
     /// # Errors
     /// When the GPU has no memory for the upload, or for buffers created before. The next version is dropped.
     fn advance(&mut self, to: &UploadTarget<'_>, bytes: u64) -> Result<u64, GpuError> {
-        let UploadTarget { device, queue, renderer } = *to;
+        let UploadTarget { device, queue, renderer, uploads } = *to;
         let Some(mut next) = self.next.take() else { return Ok(0) };
         if let Some(result) = next.pending.as_mut().and_then(Caught::poll) {
             next.pending = None;
@@ -256,7 +259,7 @@ impl GpuGaussianCapture {
             let (importances, files) = (next.importances, PlacedFiles::default());
             let mut shown = ShownCapture { levels, importances, source, files };
             if let Some(before) = self.shown.take().and_then(Arc::into_inner) {
-                shown.keep_files(before);
+                shown.keep_files(before, uploads);
             }
             self.shown = Some(Arc::new(shown));
         }
@@ -365,18 +368,20 @@ pub(in crate::plugin::render) fn any_uploading(captures: Res<RenderAssets<GpuGau
 }
 
 /// Frees the pages of chunk files that are not loaded any more, and makes pages anew for what captures may have now.
-fn release_files(captures: &mut RenderAssets<GpuGaussianCapture>, uploads: &Uploads, to: &UploadTarget<'_>) {
+fn release_files(captures: &mut RenderAssets<GpuGaussianCapture>, to: &UploadTarget<'_>) {
+    let uploads = to.uploads;
     let with_pages: Vec<_> = captures.iter().filter(|(_, capture)| capture.has_pages()).map(|(id, _)| id).collect();
     for id in with_pages {
         // Its files are other assets.
         let Some(mut capture) = captures.remove(id) else { continue };
         let is_loaded = |asset, number| {
             let file = captures.get(asset).and_then(|capture| capture.file.as_ref());
-            file.is_some_and(|file| file.index == id && file.number == number)
+            let is_own = file.is_some_and(|file| file.index == id && file.number == number);
+            is_own && uploads.file_of(asset) == Some((id, number))
         };
         let granted = uploads.granted(id);
         let resized = capture.shown_mut().and_then(|shown| {
-            shown.change_files(to, uploads, granted.unwrap_or_default(), |capture, files, to| {
+            shown.change_files(to, granted.unwrap_or_default(), |capture, files, to| {
                 files.release(capture, uploads, is_loaded);
                 match granted {
                     Some(_) => files.resize(capture, to),
@@ -390,9 +395,6 @@ fn release_files(captures: &mut RenderAssets<GpuGaussianCapture>, uploads: &Uplo
         if let Some(Err(failure)) = resized {
             warn_once_each(&format!("the memory of a capture in chunk files stays as it is: {failure}"));
         }
-        if let Some(bytes) = capture.capture().and_then(GpuCapture::paged_bytes) {
-            uploads.set_paged(id, bytes);
-        }
         captures.insert(id, capture);
     }
 }
@@ -404,16 +406,18 @@ fn release_files(captures: &mut RenderAssets<GpuGaussianCapture>, uploads: &Uplo
 fn continue_file(
     captures: &mut RenderAssets<GpuGaussianCapture>,
     id: AssetId<GaussianCapture>,
-    uploads: &Uploads,
     to: &UploadTarget<'_>,
     bytes: u64,
 ) -> Result<u64, GpuError> {
     let Some(mut file) = captures.get_mut(id).and_then(|capture| capture.file.take()) else { return Ok(0) };
+    if to.uploads.file_of(id) != Some((file.index, file.number)) {
+        file.abandon();
+    }
     // An index that will be replaced keeps no files.
     let index = captures.get_mut(file.index).filter(|index| index.next.is_none());
     let index = index.and_then(GpuGaussianCapture::shown_mut);
-    let advanced = index.zip(uploads.granted(file.index)).and_then(|(shown, most_bytes)| {
-        shown.change_files(to, uploads, most_bytes, |capture, files, to| file.advance(id, capture, files, to, bytes))
+    let advanced = index.zip(to.uploads.granted(file.index)).and_then(|(shown, most_bytes)| {
+        shown.change_files(to, most_bytes, |capture, files, to| file.advance(id, capture, files, to, bytes))
     });
     if let Some(capture) = captures.get_mut(id) {
         capture.file = Some(file);
@@ -433,8 +437,8 @@ pub(in crate::plugin::render) fn continue_uploads(
 ) {
     let _span = debug_span!("gs4d/upload").entered();
     let Some(renderer) = renderer else { return };
-    let to = UploadTarget { device: device.wgpu_device(), queue: &queue, renderer: &renderer.0 };
-    release_files(&mut captures, &uploads, &to);
+    let to = UploadTarget { device: device.wgpu_device(), queue: &queue, renderer: &renderer.0, uploads: &uploads };
+    release_files(&mut captures, &to);
     let mut waiting: Vec<_> = captures.iter().filter_map(|(id, capture)| Some((capture.bytes_left()?, id))).collect();
     waiting.sort_unstable();
     let mut left = budget.bytes_per_frame.max(1);
@@ -444,7 +448,7 @@ pub(in crate::plugin::render) fn continue_uploads(
         }
         let Some(capture) = captures.get_mut(id) else { continue };
         let advanced = match capture.file {
-            Some(_) => continue_file(&mut captures, id, &uploads, &to, left),
+            Some(_) => continue_file(&mut captures, id, &to, left),
             None => capture.advance(&to, left),
         };
         match advanced {
@@ -460,4 +464,6 @@ pub(in crate::plugin::render) fn continue_uploads(
             }
         }
     }
+    let paged = |(id, capture): (_, &GpuGaussianCapture)| Some((id, capture.capture()?.paged_bytes()?));
+    uploads.set_paged(captures.iter().filter_map(paged));
 }
