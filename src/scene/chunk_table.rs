@@ -7,7 +7,7 @@
 use serde::{Deserialize, Serialize};
 
 /// The chunk files of a capture, in the order of their numbers.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ChunkTable {
     /// Number of stretches of time into which the capture is cut, of equal length.
     pub stretches: u32,
@@ -16,6 +16,10 @@ pub struct ChunkTable {
     pub gaussian_bytes: u32,
     /// The files.
     pub files: Vec<ChunkFile>,
+    /// What each layer adds to the PSNR of held-out views for each byte of its files, dB per megabyte; empty if that was
+    /// not measured.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub utilities: Vec<f32>,
 }
 
 /// A chunk file: Gaussians that are only drawn within some stretches of time.
@@ -59,6 +63,8 @@ impl ChunkTable {
     pub const MOST_LAYERS: u32 = 16;
     /// Most bytes of a Gaussian on the GPU: more than those of any form, with a temporal filter of any size.
     pub const MOST_GAUSSIAN_BYTES: u32 = 1 << 14;
+    /// The largest of the [delays](Self::delays).
+    pub const LATEST: f64 = 16.0;
     /// Gaussians of a page, the unit of memory on the GPU: a block of the packed form.
     pub const PAGE: u64 = 256;
 
@@ -84,6 +90,24 @@ impl ChunkTable {
         self.files.iter().map(|file| file.layer.saturating_add(1)).max().unwrap_or_default()
     }
 
+    /// Returns how much later the files of each layer may come than those of layer 0, in multiples of
+    /// [`StreamLimits::layer_seconds`](crate::codec::stream::StreamLimits::layer_seconds): 1 for a layer of a quarter of the
+    /// utility of layer 0, so that a byte counts a quarter as much once it is that late, 2 for a sixteenth and so on, at most
+    /// [`LATEST`](Self::LATEST), which layers have that make pictures worse. Where utilities were not measured, each layer
+    /// counts as a quarter of the one before.
+    pub fn delays(&self) -> [f64; Self::MOST_LAYERS as usize] {
+        let first = self.utilities.first().copied().map_or(0.0, |own| f64::from(own).max(0.0));
+        std::array::from_fn(|layer| match self.utilities.get(layer) {
+            None => layer as f64,
+            Some(_) if layer == 0 => 0.0,
+            // NaN, of no utility at all, is the latest.
+            Some(&own) => match (first / f64::from(own).max(0.0)).log2() / 2.0 {
+                delay if delay <= Self::LATEST => delay.max(0.0),
+                _ => Self::LATEST,
+            },
+        })
+    }
+
     /// Returns the bytes of all files of the layers up to this one.
     pub fn bytes_up_to(&self, layer: u32) -> u64 {
         let own = self.files.iter().filter(|file| file.layer <= layer);
@@ -104,6 +128,14 @@ impl ChunkTable {
         ((share * f64::from(self.stretches)).max(0.0) as u32).min(self.stretches.saturating_sub(1))
     }
 
+    /// Returns the first and the last of `stretches` stretches of time that segments have: from the first to the last of
+    /// them, of `of` segments of the same time. Both are of equal length.
+    pub fn stretches_of([first, last]: [u32; 2], of: u32, stretches: u32) -> [u32; 2] {
+        let (segments, stretches) = (u64::from(of.max(1)), u64::from(stretches.max(1)));
+        let last = ((u64::from(last) + 1) * stretches).div_ceil(segments).clamp(1, stretches) - 1;
+        [(u64::from(first) * stretches / segments).min(last) as u32, last as u32]
+    }
+
     /// Checks that a player can use the table.
     ///
     /// # Errors
@@ -120,6 +152,9 @@ impl ChunkTable {
         }
         if self.gaussian_bytes > Self::MOST_GAUSSIAN_BYTES {
             return Err("a table of chunk files whose Gaussians have more than 16384 bytes each");
+        }
+        if self.utilities.len() > Self::MOST_LAYERS as usize || self.utilities.iter().any(|own| !own.is_finite()) {
+            return Err("a table of chunk files with more than 16 utilities of layers, or one that is not finite");
         }
         for ChunkFile { stretches: [first, last], layer, gaussians, bytes } in &self.files {
             if first > last || *last >= self.stretches {
@@ -146,7 +181,12 @@ mod tests {
 
     fn table() -> ChunkTable {
         let file = |first, last, layer| ChunkFile { stretches: [first, last], layer, gaussians: 10, bytes: 1000 };
-        ChunkTable { stretches: 4, gaussian_bytes: 80, files: vec![file(0, 0, 0), file(0, 3, 1), file(2, 3, 0)] }
+        ChunkTable {
+            stretches: 4,
+            gaussian_bytes: 80,
+            files: vec![file(0, 0, 0), file(0, 3, 1), file(2, 3, 0)],
+            utilities: Vec::new(),
+        }
     }
 
     #[test]
@@ -154,6 +194,19 @@ mod tests {
         let text = ron::to_string(&table()).expect("numbers can be written");
         assert!(text.contains("(0,3,1,10,1000)"), "short: {text}");
         assert_eq!(ron::from_str::<ChunkTable>(&text), Ok(table()), "and read again");
+    }
+
+    #[test]
+    fn layers_of_less_utility_may_come_later() {
+        let delays = |utilities: &[f32]| {
+            let delays = ChunkTable { utilities: utilities.to_vec(), ..table() }.delays();
+            assert_eq!(delays[4], 4.0, "a layer that was not measured");
+            [delays[0], delays[1], delays[2], delays[3]]
+        };
+        assert_eq!(delays(&[]), [0.0, 1.0, 2.0, 3.0], "not measured: a quarter each");
+        assert_eq!(delays(&[64.0, 16.0, 4.0, 2.0]), [0.0, 1.0, 2.0, 2.5], "a quarter, a sixteenth, half of that");
+        assert_eq!(delays(&[8.0, 16.0, 0.0, -1.0]), [0.0, 0.0, 16.0, 16.0], "more utility, none, and worse pictures");
+        assert_eq!(delays(&[0.0, 0.0, -1.0, 1.0]), [0.0, 16.0, 16.0, 0.0], "a first layer without utility");
     }
 
     #[test]
@@ -173,10 +226,23 @@ mod tests {
     }
 
     #[test]
+    fn segments_have_every_stretch_that_they_touch() {
+        let of = |segments: u32, stretches: u32| {
+            (0..segments).map(move |at| ChunkTable::stretches_of([at; 2], segments, stretches))
+        };
+        assert_eq!(of(2, 4).collect::<Vec<_>>(), [[0, 1], [2, 3]], "two stretches each");
+        assert_eq!(of(4, 2).collect::<Vec<_>>(), [[0, 0], [0, 0], [1, 1], [1, 1]], "half a stretch each");
+        assert_eq!(of(3, 4).collect::<Vec<_>>(), [[0, 1], [1, 2], [2, 3]], "a stretch and a third each");
+        assert_eq!(ChunkTable::stretches_of([1, 2], 3, 6), [2, 5], "several segments");
+        assert_eq!(ChunkTable::stretches_of([9, u32::MAX], 3, 6), [5, 5], "segments that are not there");
+        assert_eq!(ChunkTable::stretches_of([0, 0], 0, 0), [0, 0], "no segments, no stretches");
+    }
+
+    #[test]
     fn pages_are_whole() {
         let table = |gaussians| {
             let file = ChunkFile { stretches: [0, 0], layer: 0, gaussians, bytes: 0 };
-            ChunkTable { stretches: 1, gaussian_bytes: 80, files: vec![file] }
+            ChunkTable { stretches: 1, gaussian_bytes: 80, files: vec![file], utilities: Vec::new() }
         };
         let pages = |gaussians| table(gaussians).page_bytes(0) / (80 * ChunkTable::PAGE);
         assert_eq!([0, 1, 255, 256, 257, 512, 513].map(pages), [0, 1, 1, 1, 2, 2, 3], "256 Gaussians to a page");
@@ -188,7 +254,9 @@ mod tests {
     fn faulty_tables_are_refused() {
         assert_eq!(table().check(), Ok(()), "a good table");
         assert_eq!((table().gpu_bytes(1), table().gpu_bytes(3)), (800, 0), "bytes of a file on the GPU");
-        let faults: [fn(&mut ChunkTable); 9] = [
+        let faults: [fn(&mut ChunkTable); 11] = [
+            |table| table.utilities = vec![1.0; 17],
+            |table| table.utilities = vec![1.0, f32::NAN],
             |table| table.stretches = 0,
             |table| table.gaussian_bytes = 0,
             |table| table.gaussian_bytes = 16_385,

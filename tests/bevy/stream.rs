@@ -20,7 +20,7 @@ use bevy::render::renderer::RenderDevice;
 use bevy::time::TimeUpdateStrategy;
 use bevy_gs4d::codec::stream::StreamSchedule;
 use bevy_gs4d::codec::{self, ReadOptions};
-use bevy_gs4d::playback::{ClipFade, FollowsClock, PlaybackClock};
+use bevy_gs4d::playback::{Clip, ClipFade, FollowsClock, PlaybackClock, Timeline, TimelinePlayer, Track};
 use bevy_gs4d::prelude::*;
 use bevy_gs4d::render::CaptureSettings;
 use bevy_gs4d::scene::ChunkTable;
@@ -228,6 +228,26 @@ fn said(app: &mut App) -> Vec<String> {
 }
 
 #[test]
+fn the_next_clip_of_a_timeline_is_loaded_before_it_begins() {
+    let mut stage = Stage::new();
+    stage.gate.open();
+    let capture: Handle<GaussianCapture> = stage.app.world().resource::<AssetServer>().load(INDEX);
+    let clip = |start, range| Clip { capture: capture.clone(), start, range, speed: 1.0, fade: [0.0; 2] };
+    let clips = vec![clip(0.0, [0.0, 0.4]), clip(2.0, [LATE, SECONDS])];
+    let timeline = Timeline::new(vec![Track { name: "one".into(), clips }], Vec::new(), None).expect("a timeline");
+    let timeline = stage.app.world_mut().resource_mut::<Assets<Timeline>>().add(timeline);
+    let player = stage.app.world_mut().spawn((TimelinePlayer(timeline), Playback::once())).id();
+    let gate = stage.gate.clone();
+    let are_read = |files: BTreeSet<usize>| names(files).all(|name| gate.reads().contains_key(&name));
+    until(&mut stage.app, "the files of the clip to come", |_| are_read(needed(LATE)));
+    assert_eq!(time(&stage.app, player), 0.0, "two seconds before");
+    let of_clips: BTreeSet<usize> = needed(0.2).union(&needed(LATE)).copied().collect();
+    let between: BTreeSet<usize> = needed(2.2).difference(&of_clips).copied().collect();
+    assert!(!between.is_empty(), "the capture has files that no clip plays");
+    assert!(names(between).all(|name| !gate.reads().contains_key(&name)), "what no clip plays is not loaded");
+}
+
+#[test]
 fn a_capture_is_ready_once_its_coarse_picture_is_there_and_then_becomes_whole() {
     let mut stage = Stage::new();
     let entity = stage.spawn(Playback::default());
@@ -330,10 +350,11 @@ fn settings_decide_what_is_drawn_while_the_most_important_gaussians_are_missing(
     for on_underrun in [OnUnderrun::Stall, OnUnderrun::Hold, OnUnderrun::Coarse] {
         let mut stage = Stage::new();
         let app = &mut stage.app;
-        stage.gate.let_through(names(coarse(0.0)));
         let capture = app.world().resource::<AssetServer>().load(INDEX);
         let settings = CaptureStreamSettings { on_underrun, ..default() };
         let entity = app.world_mut().spawn((GaussianCapture3d(capture), settings)).id();
+        until(app, "the stream", |app| stream(app, entity).needed > 0);
+        stage.gate.let_through(names(coarse(0.0)));
         until(app, "the first picture", |app| stream(app, entity).is_coarse);
         let [buffering, buffered] =
             [debug(&CaptureBuffering { entity, seconds: 0.0 }), debug(&CaptureBuffered { entity, seconds: 0.0 })];

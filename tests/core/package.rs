@@ -830,7 +830,7 @@ fn index(files: usize) -> GaussianScene {
         ChunkFile { stretches, layer: layer as u32, gaussians: 12_345, bytes: bytes as u64 }
     };
     let files = (0..files).map(file).collect();
-    let table = ChunkTable { stretches: 3_600, gaussian_bytes: 88, files };
+    let table = ChunkTable { stretches: 3_600, gaussian_bytes: 88, files, utilities: Vec::new() };
     let shape = Shape { model: None, count: 0, ..SMALL };
     GaussianScene { chunks: Some(Arc::new(table)), ..scene(&shape, 35) }
 }
@@ -873,7 +873,7 @@ fn bad_tables_of_chunk_files_are_neither_read_nor_written() {
         let message = refusal(&good.clone().swap(from, to).seal()).to_string();
         assert!(message.contains(expected), "{from} as {to}: {message}");
     }
-    let table = ChunkTable { stretches: 0, gaussian_bytes: 88, files: Vec::new() };
+    let table = ChunkTable { stretches: 0, gaussian_bytes: 88, files: Vec::new(), utilities: Vec::new() };
     let bad = GaussianScene { chunks: Some(Arc::new(table)), ..index(0) };
     let mut nested = detailed();
     let level = nested.levels[1].scene.as_ref().clone();

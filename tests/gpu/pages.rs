@@ -88,7 +88,8 @@ impl Files {
             bytes: 1,
         };
         let gaussian_bytes = GaussianScene::from(whole.clone()).gaussian_bytes();
-        let table = ChunkTable { stretches: 4, gaussian_bytes, files: files.iter().map(row).collect() };
+        let table =
+            ChunkTable { stretches: 4, gaussian_bytes, files: files.iter().map(row).collect(), utilities: Vec::new() };
         Self { index: cut(&whole, 0..0), whole, files, table: table.into() }
     }
 

@@ -81,6 +81,8 @@ pub(crate) enum Need {
     // Of compression.
     /// Views that are compared with the original.
     VerifiedViews,
+    /// Layers of chunk files that are measured.
+    MeasuredLayers,
     /// A quality that changes values.
     Quantized,
     /// A quality that changes the order of the Gaussians.
@@ -339,6 +341,11 @@ pub(crate) const RULES: &[Rule] = &[
         need: Need::VerifiedViews,
         options: &["--cameras", "--orbit", "--time", "--size", "--resolution", "--engine", "--adapter", "--checks"],
         reason: "with --verify 0: no view is drawn",
+    },
+    Rule {
+        need: Need::MeasuredLayers,
+        options: &["--validation", "--trust-images", "--engine", "--adapter", "--checks"],
+        reason: "without --data: no layer is measured",
     },
     Rule {
         need: Need::Quantized,

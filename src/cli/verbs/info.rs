@@ -111,6 +111,8 @@ struct ChunkFacts {
     gaussians: u64,
     /// The length of all files.
     bytes: u64,
+    /// What each layer adds to the PSNR of held-out views, dB per megabyte; empty if that was not measured.
+    decibels_per_megabyte: Vec<f32>,
 }
 
 /// The order of chunk files.
@@ -312,10 +314,16 @@ impl Facts {
             let what = format!("{points} points, {triangles} triangles, {stretches} stretches of time");
             pairs.push(("colliders", what));
         }
-        if let Some(ChunkFacts { files, stretches, layers, gaussians, bytes: length }) = &self.chunks {
+        if let Some(ChunkFacts { files, stretches, layers, gaussians, bytes: length, decibels_per_megabyte }) =
+            &self.chunks
+        {
             let length = bytes(*length);
             let of = format!("{gaussians} Gaussians in {layers} layers over {stretches} stretches of time, {length}");
             pairs.push(("chunks", format!("the index of {files} chunk files: {of}")));
+            let utilities: Vec<String> = decibels_per_megabyte.iter().map(|own| format!("{own:.1}")).collect();
+            if !utilities.is_empty() {
+                pairs.push(("layers", format!("{} dB per MB, on held-out views", utilities.join(", "))));
+            }
         }
         if let Some(RunFacts { files, stretches, layers }) = &self.runs {
             let of = format!("{files} chunk files in {layers} layers over {stretches} stretches of time");
@@ -357,6 +365,7 @@ impl ChunkFacts {
             layers: table.layers(),
             gaussians: table.files.iter().map(|file| file.gaussians).sum(),
             bytes: table.files.iter().map(|file| file.bytes).sum(),
+            decibels_per_megabyte: table.utilities.clone(),
         }
     }
 }

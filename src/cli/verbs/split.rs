@@ -1,18 +1,21 @@
 //! `gs4d split IN -o FOLDER`: cuts a capture into chunk files.
 //!
 //! In: a capture, the length of a stretch of time, the shares of its layers; or a packed capture, which has been cut when
-//! it was compressed. Out: a folder with a package for each layer
-//! of each run of Gaussians that are alive in the same stretches, and an index of them; a report of the times and the
-//! size of each, and of the bit rates of layers.
+//! it was compressed; perhaps a dataset, on whose validation views layers are measured. Out: a folder with a package for
+//! each layer of each run of Gaussians that are alive in the same stretches, and an index of them; a report of the times and
+//! the size of each, and of the bit rates and the utilities of layers.
 
 use super::info::bit_rate;
-use crate::cli::args::{CheckpointArgs, Given, Need, file_size, values};
+use crate::cli::args::{CheckpointArgs, DataArgs, EngineArgs, Given, Need, ValidationArgs, file_size, values};
 use crate::cli::output::failure::Failure;
 use crate::cli::output::progress::Bars;
 use crate::cli::output::report::Report;
 use crate::cli::output::table::{Table, bytes, lines};
+use crate::offline::measure::belonging::require_belonging;
+use crate::offline::measure::reference_pictures::ReferencePictures;
 use crate::offline::segments::{Chunk, Chunks, Cut, LayerShares, Segment, Split, other_chunk};
 use crate::offline::store::outputs::Files;
+use crate::offline::work::{Progress, proceed};
 use crate::scene::{ChunkTable, Form, SceneForm};
 use serde_json::{Value, json};
 use std::fs;
@@ -35,8 +38,10 @@ Examples:
   gs4d split long.gs4d -o chunks --chunk 0.5 --layers 20,30,50 --json
   gs4d compress long.gs4d packed.gs4d --chunk 1 --layers 5,20,25,50
   gs4d split packed.gs4d -o chunks
+  gs4d split packed.gs4d -o chunks --data data/take
   gs4d join chunks -o long.gs4d
 
+With --data, the layers are measured on the validation views: the index has what each adds to the PSNR for each byte, and players fetch by that.
 The pictures of the joined chunks are those of IN. Its Gaussians are in the order of the chunks; split and joined once more, the files are the
 same byte for byte. Runs and layers of fewer than 256 Gaussians become part of others, packed runs of fewer than 2048.")]
 pub(crate) struct SplitVerb {
@@ -57,15 +62,24 @@ pub(crate) struct SplitVerb {
     /// zstd level, 1 (fast) to 19 (small) [default: 9; of packed captures 19].
     #[arg(long, value_name = "LEVEL", value_parser = clap::value_parser!(i32).range(1..=19))]
     level: Option<i32>,
+    #[command(flatten)]
+    data: DataArgs,
+    #[command(flatten)]
+    validation: ValidationArgs,
+    #[command(flatten)]
+    engine: EngineArgs,
 }
 
 impl SplitVerb {
     /// Cuts the capture and writes the chunk files and their index.
     ///
     /// # Errors
-    /// A capture that cannot be read, or is packed and was not cut when it was compressed; chunks of another capture in the folder, files that cannot be written.
+    /// A capture that cannot be read, or is packed and was not cut when it was compressed; chunks of another capture in the
+    /// folder, files that cannot be written; views that cannot be used, a failure of the engine.
     pub(crate) fn run(&self) -> Result<Report, Failure> {
-        let files = Files::default().reads_scene(&self.input);
+        self.given.require(Need::MeasuredLayers, self.data.is_given())?;
+        self.engine.check(&self.given)?;
+        let files = self.data.add_to(Files::default().reads_scene(&self.input));
         let index = self.out.join(ChunkTable::INDEX);
         // A wrong path is reported before the capture is read.
         files.clone().writes_folder(&self.out, [index.clone()]).check()?;
@@ -88,9 +102,41 @@ impl SplitVerb {
             return Err(Failure::about(&other, reason));
         }
         files.writes_folder(&self.out, paths.into_iter().chain([index])).check()?;
+        let psnrs = if self.data.is_given() { self.measure(&segment, &split)? } else { Vec::new() };
         fs::create_dir_all(&self.out).map_err(|error| Failure::at(&self.out, &error))?;
-        let chunks = split.write(&segment, &self.out, self.level, &mut Bars::default())?;
-        self.report(&segment, &chunks)
+        let chunks = split.write(&segment, &self.out, self.level, &psnrs, &mut Bars::default())?;
+        self.report(&segment, &chunks, &psnrs)
+    }
+
+    /// Returns the PSNR of the validation views without a layer, with the first, with the first two and so on, dB.
+    fn measure(&self, segment: &Segment, split: &Split) -> Result<Vec<f64>, Failure> {
+        let progress = &mut Bars::default();
+        let scene = &segment.scene;
+        let views = self.data.divide(self.validation, &scene.trained_with, progress)?.validation;
+        if views.is_empty() {
+            let reason = "--data has no validation views within its times, on which layers could be measured";
+            return Err(Failure::about(&self.input, reason));
+        }
+        let first_layers = |count: u32| {
+            let layers = split.first_layers(scene, count).into_runtime();
+            layers.map_err(|error| Failure::at(&self.input, &error))
+        };
+        let engine = &mut self.engine.open(&self.given)?;
+        let whole = first_layers(split.layers())?;
+        let background = whole.trained_background();
+        if !self.validation.trust_images {
+            require_belonging(engine, &whole, &views, background)?;
+        }
+        let pictures = ReferencePictures::of_images(&views, &scene.trained_with, background)?;
+        progress.begin("layers", split.layers() as usize + 1);
+        let mut psnrs = Vec::with_capacity(split.layers() as usize + 1);
+        for count in 0..=split.layers() {
+            proceed(progress)?;
+            psnrs.push(pictures.psnr(engine, &first_layers(count)?)?);
+            progress.advance();
+        }
+        progress.finish();
+        Ok(psnrs)
     }
 
     /// Returns the number of stretches of time of a capture that plays for `seconds`.
@@ -102,7 +148,7 @@ impl SplitVerb {
         })
     }
 
-    fn report(&self, segment: &Segment, chunks: &Chunks) -> Result<Report, Failure> {
+    fn report(&self, segment: &Segment, chunks: &Chunks, psnrs: &[f64]) -> Result<Report, Failure> {
         let Chunks { index, table, files } = chunks;
         let (before, of_index) = (file_size(&self.input)?, file_size(index)?);
         let total = table.files.iter().map(|file| file.bytes).sum::<u64>() + of_index;
@@ -141,6 +187,11 @@ impl SplitVerb {
             let rates: Vec<String> = rates.iter().enumerate().map(up_to).collect();
             facts.push(("bit rate", rates.join(", ")));
         }
+        if let [without, with @ ..] = psnrs {
+            let utilities = table.utilities.iter().zip(with).map(|(own, psnr)| format!("{psnr:.2} ({own:.1})"));
+            let utilities = utilities.collect::<Vec<_>>().join(", ");
+            facts.push(("PSNR", format!("{without:.2} dB without a layer; with each (dB per MB): {utilities}")));
+        }
         let json = json!({
             "in": self.input.display().to_string(),
             "out": self.out.display().to_string(),
@@ -152,6 +203,8 @@ impl SplitVerb {
             "index": { "file": index.display().to_string(), "bytes": of_index },
             "first_picture_bytes": first,
             "megabits_per_second": rates,
+            "psnr_up_to_layer": psnrs,
+            "decibels_per_megabyte": table.utilities,
             "chunks": listed,
         });
         Ok(Report::new(json, format!("{rows}\n{}", lines(&facts))))

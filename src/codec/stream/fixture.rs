@@ -9,7 +9,7 @@ use crate::scene::{ChunkFile, ChunkTable};
 /// Returns a table of files, each its stretches, its layer and its bytes on the GPU, which are also those of the file.
 pub(super) fn table(stretches: u32, files: &[([u32; 2], u32, u64)]) -> ChunkTable {
     let file = |&(stretches, layer, bytes)| ChunkFile { stretches, layer, gaussians: bytes, bytes };
-    ChunkTable { stretches, gaussian_bytes: 1, files: files.iter().map(file).collect() }
+    ChunkTable { stretches, gaussian_bytes: 1, files: files.iter().map(file).collect(), utilities: Vec::new() }
 }
 
 /// Returns a player at a time, with a velocity, in a range of any end.
@@ -38,4 +38,9 @@ pub(super) fn random_head(random: &mut Random, duration: f32) -> Playhead {
     // One that stands comes after those that play.
     let delay = if velocity == 0.0 { 1e-3 } else { 0.0 };
     Playhead { seconds: now, velocity, range, turn, delay }
+}
+
+/// Returns the delays of layers of which each may come so many seconds later than the one before.
+pub(super) fn even_delays(layer_seconds: f64) -> [f64; ChunkTable::MOST_LAYERS as usize] {
+    std::array::from_fn(|layer| layer as f64 * layer_seconds)
 }

@@ -31,25 +31,30 @@ pub(super) struct Ledger {
     resident: BTreeSet<usize>,
     gpu_bytes: u64,
     host_bytes: u64,
+    /// Bytes on the GPU of all files of the table.
+    all_gpu_bytes: u64,
 }
 
 impl Ledger {
     /// Returns the ledger of a capture of which no file is there.
     pub(super) fn new(table: Arc<ChunkTable>) -> Self {
+        let all = (0..table.files.len()).map(|file| table.gpu_bytes(file));
         Self {
             states: vec![FileState::Absent; table.files.len()],
-            table,
             is_in_pages: false,
             requested: BTreeSet::new(),
             resident: BTreeSet::new(),
             gpu_bytes: 0,
             host_bytes: 0,
+            all_gpu_bytes: all.fold(0, u64::saturating_add),
+            table,
         }
     }
 
     /// Returns the ledger of a capture of which no file is there, and whose files take whole pages on the GPU.
     pub(super) fn in_pages(table: Arc<ChunkTable>) -> Self {
-        Self { is_in_pages: true, ..Self::new(table) }
+        let all = (0..table.files.len()).map(|file| table.page_bytes(file));
+        Self { is_in_pages: true, all_gpu_bytes: all.fold(0, u64::saturating_add), ..Self::new(table) }
     }
 
     /// Returns the table of the files.
@@ -80,6 +85,11 @@ impl Ledger {
     /// Returns the bytes that a file takes on the GPU.
     pub(super) fn gpu_bytes_of(&self, file: usize) -> u64 {
         if self.is_in_pages { self.table.page_bytes(file) } else { self.table.gpu_bytes(file) }
+    }
+
+    /// Returns the bytes on the GPU of all files of the table.
+    pub(super) fn all_gpu_bytes(&self) -> u64 {
+        self.all_gpu_bytes
     }
 
     /// Returns the bytes in memory of all files on the way: the files, and their Gaussians.

@@ -19,7 +19,8 @@ pub struct StreamLimits {
     /// How far ahead of a player files are fetched, seconds of playing, at most [`MOST_AHEAD`](Self::MOST_AHEAD); NaN
     /// counts as 0. Default: 10.
     pub ahead: f64,
-    /// For each layer above 0, how many seconds later than layer 0 a file may come: with more, the first layer of what is
+    /// For each layer above 0, or each [delay](crate::scene::ChunkTable::delays) of one, how many seconds later than layer 0 a
+    /// file may come: with more, the first layer of what is
     /// played later comes before the last layer of now. Less suits a link that is fast for the capture. Counts as at
     /// least a millisecond. Default: [`LAYER_SECONDS`](Self::LAYER_SECONDS).
     pub layer_seconds: f64,

@@ -25,14 +25,15 @@
 //! ```
 //!
 //! Each file has an urgency in seconds: the time until a player reaches its stretches, and 1.5 s for each layer above
-//! the first, so that the most important Gaussians of the next second come before the least important ones of now. The
+//! the first, or more for a layer that adds less where that was measured (`ChunkTable::delays`), so that the most important Gaussians of the next second come before the least important ones of now. The
 //! files of the smallest urgency are fetched; if the memory on the GPU is full, those of a clearly greater urgency are
 //! given up for them.
 //!
 //! `course` is where a player goes; `urgency` follows from the courses of all players; `intervals` finds the files of
 //! stretches; `ledger` counts files and bytes, in whole pages for a host whose memory on the GPU is in pages;
 //! `deadlines` says when a request has taken too long, `retries` when a file that failed is asked for again; `giving_up`
-//! selects files to give up; `schedule` joins them.
+//! selects files to give up; `schedule` joins them. `throughput` is how fast files arrive, by which a host sets the limits;
+//! `obstacle` is why a picture may never be there.
 
 mod course;
 mod coverage;
@@ -43,6 +44,7 @@ mod giving_up;
 mod intervals;
 mod ledger;
 mod limits;
+mod obstacle;
 mod playhead;
 #[cfg(test)]
 mod random_steps;
@@ -50,10 +52,13 @@ mod retries;
 #[cfg(test)]
 mod rules;
 mod schedule;
+mod throughput;
 mod urgency;
 
 pub use coverage::Coverage;
 pub use ledger::FileState;
 pub use limits::StreamLimits;
+pub use obstacle::Obstacle;
 pub use playhead::{Playhead, Turn};
 pub use schedule::{StreamPlan, StreamSchedule};
+pub use throughput::Throughput;

@@ -24,6 +24,17 @@ pub struct Playhead {
     pub delay: f64,
 }
 
+/// Seconds by which what is played now comes before times at which nothing plays.
+const STILL_DELAY: f64 = 1e-3;
+
+impl Playhead {
+    /// Returns a time at which nothing plays, in seconds since the capture's start: that of a picture that stays, or one to
+    /// which a player may jump.
+    pub fn still(seconds: f64) -> Self {
+        Self { seconds, velocity: 0.0, range: [seconds; 2], turn: Turn::Stop, delay: STILL_DELAY }
+    }
+}
+
 /// What a player does at the end of its range.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Turn {

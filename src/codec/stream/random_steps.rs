@@ -55,7 +55,8 @@ fn random_table(random: &mut Random) -> ChunkTable {
         }
     });
     let files = files.collect();
-    ChunkTable { stretches: stretches as u32, gaussian_bytes: 1 + random.below(80) as u32, files }
+    let utilities = (0..random.below(4)).map(|_| random.in_range(-1.0, 8.0)).collect();
+    ChunkTable { stretches: stretches as u32, gaussian_bytes: 1 + random.below(80) as u32, files, utilities }
 }
 
 impl Host {
@@ -103,7 +104,12 @@ impl Host {
 
     fn demand(&self) -> Demand {
         let axis = Axis::new(self.duration.into(), self.table.stretches);
-        Demand::new(&self.heads, axis, self.limits.ahead.clamp(0.0, 600.0), self.limits.layer_seconds)
+        Demand::new(
+            &self.heads,
+            axis,
+            self.limits.ahead.clamp(0.0, 600.0),
+            self.table.delays().map(|delay| delay * self.limits.layer_seconds),
+        )
     }
 
     fn urgency(&self, demand: &Demand, file: usize) -> Urgency {
@@ -278,8 +284,9 @@ impl Host {
         self.limits.gpu_bytes = (0..self.table.files.len()).map(|file| self.bytes(file)[0]).sum();
         self.settle();
         let demand = self.demand();
-        let layers = self.table.files.iter().map(|file| file.layer).max().unwrap_or(0);
-        let longest = f64::from(layers) * self.limits.layer_seconds;
+        let delays = self.table.delays();
+        let longest = self.table.files.iter().map(|file| delays[file.layer as usize]).fold(0.0, f64::max);
+        let longest = longest * self.limits.layer_seconds;
         for head in &self.heads {
             let coverage = self.schedule.coverage(head.seconds);
             assert!(coverage.is_whole() && coverage.is_coarse, "{coverage:?} of {head:?} within {:?}", self.limits);

@@ -450,3 +450,20 @@ fn the_largest_table_is_played_through() {
     assert!(schedule.coverage(53.91).is_whole(), "all of the last time is there");
     assert!((0.9..1.3).contains(&schedule.buffered(&head)), "a second ahead: {}", schedule.buffered(&head));
 }
+
+#[test]
+fn a_host_knows_what_playing_needs_and_whether_what_is_ahead_has_room() {
+    // Ten seconds of 500 bytes each.
+    let files: Vec<File> = (0..10).map(|stretch| ([stretch; 2], 0, 500)).collect();
+    let schedule = schedule(10, &files);
+    let needed = |velocities: &[f64]| {
+        let heads: Vec<Playhead> = velocities.iter().map(|velocity| head(0.0, *velocity, Turn::Loop)).collect();
+        schedule.bytes_per_second(&heads)
+    };
+    assert_eq!([needed(&[0.0]), needed(&[1.0, -4.0]), needed(&[])], [500.0, 2000.0, 500.0], "the fastest decides");
+    let has_room = |bytes, ahead| schedule.has_room(bytes, ahead);
+    assert!(has_room(2000, 2.0) && !has_room(1999, 2.0), "two seconds ahead, and two behind");
+    assert!(has_room(5000, 1e9) && !has_room(4999, 1e9), "all of it");
+    let still = StreamSchedule::new(table(1, &[([0, 0], 0, 500)]).into(), 0.0);
+    assert!(still.has_room(500, 2.0) && !still.has_room(499, 2.0), "a still is all of it");
+}

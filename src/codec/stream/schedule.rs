@@ -12,7 +12,7 @@ use super::ledger::{FileState, Ledger};
 use super::limits::StreamLimits;
 use super::playhead::Playhead;
 use super::retries::Retries;
-use super::urgency::{Demand, Urgency};
+use super::urgency::{Delays, Demand, Urgency};
 use crate::scene::ChunkTable;
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -40,7 +40,7 @@ pub struct StreamPlan {
 /// // One file of all the time, and one for each of four stretches of 2 seconds.
 /// let file = |first, last| ChunkFile { stretches: [first, last], layer: 0, gaussians: 1000, bytes: 24_000 };
 /// let files = vec![file(0, 3), file(0, 0), file(1, 1), file(2, 2), file(3, 3)];
-/// let table = ChunkTable { stretches: 4, gaussian_bytes: 80, files };
+/// let table = ChunkTable { stretches: 4, gaussian_bytes: 80, files, utilities: Vec::new() };
 /// let mut schedule = StreamSchedule::new(table.into(), 8.0);
 ///
 /// let head = Playhead { seconds: 3.0, velocity: 1.0, range: [0.0, 8.0], turn: Turn::Loop, delay: 0.0 };
@@ -65,6 +65,10 @@ pub struct StreamSchedule {
     coarse: Intervals,
     /// The latest time of the host's clock, in seconds.
     now: f64,
+    /// Bytes of all files.
+    all_bytes: u64,
+    /// How much later each layer may come.
+    delays: Delays,
 }
 
 impl StreamSchedule {
@@ -80,6 +84,8 @@ impl StreamSchedule {
                 files().filter(|(_, file)| file.layer == 0).map(|(number, file)| (number, file.stretches)),
             ),
             now: 0.0,
+            all_bytes: table.bytes_up_to(ChunkTable::MOST_LAYERS),
+            delays: table.delays(),
             ledger: Ledger::new(table),
         }
     }
@@ -113,7 +119,8 @@ impl StreamSchedule {
     /// [failed](Self::failed).
     pub fn plan(&mut self, now: f64, heads: &[Playhead], limits: &StreamLimits) -> StreamPlan {
         self.pass_time(now);
-        let demand = Demand::new(heads, self.axis, limits.ahead_seconds(), limits.seconds_of_layer());
+        let delays = self.delays.map(|delay| delay * limits.seconds_of_layer());
+        let demand = Demand::new(heads, self.axis, limits.ahead_seconds(), delays);
         let mut plan = StreamPlan::default();
         let requested = self.ledger.requested().iter().copied();
         let overdue: Vec<usize> = requested.filter(|file| self.is_overdue(*file)).collect();
@@ -207,6 +214,19 @@ impl StreamSchedule {
         let missing = entered.find(|file| self.state(*file) != FileState::Resident);
         let until = missing.and_then(|file| self.table().files.get(file)).map(|file| file.stretches);
         until.map_or(f64::INFINITY, |stretches| course.seconds_until(stretches)).min(course.seconds())
+    }
+
+    /// Returns how many bytes per second the players need, with all layers: each file once.
+    pub fn bytes_per_second(&self, heads: &[Playhead]) -> f64 {
+        let speed = heads.iter().map(|head| head.velocity.abs()).fold(1.0, f64::max);
+        self.all_bytes as f64 / self.duration() * speed
+    }
+
+    /// Returns whether about all that is so many seconds ahead of a player, and as much behind it, has room in so many bytes
+    /// on the GPU.
+    pub fn has_room(&self, gpu_bytes: u64, ahead: f64) -> bool {
+        let share = (2.0 * ahead / self.duration()).min(1.0);
+        self.ledger.all_gpu_bytes() as f64 * share <= gpu_bytes as f64
     }
 
     /// Returns the bytes on the GPU of the Gaussians of files that are there or on the way.

@@ -5,7 +5,7 @@
 
 use super::course::{Axis, Course};
 use super::playhead::Playhead;
-use crate::scene::ChunkFile;
+use crate::scene::{ChunkFile, ChunkTable};
 use std::cmp::Ordering;
 use std::collections::BTreeSet;
 
@@ -19,9 +19,12 @@ pub(super) struct Demand {
     players: Vec<Player>,
     /// How far ahead files are fetched, seconds of playing.
     ahead: f64,
-    /// Seconds that a file may come later for each layer above 0.
-    layer_seconds: f64,
+    /// Seconds that a file of each layer may come later.
+    delays: Delays,
 }
+
+/// Seconds that a file of each layer may come later.
+pub(super) type Delays = [f64; ChunkTable::MOST_LAYERS as usize];
 
 /// Where a player goes, and how many seconds later than it gets there it may have what it needs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,15 +48,14 @@ pub(super) struct Urgency {
 }
 
 impl Demand {
-    /// Returns what players need that look ahead as many seconds of playing; files may come `layer_seconds` later for each
-    /// layer above 0.
-    pub(super) fn new(heads: &[Playhead], axis: Axis, ahead: f64, layer_seconds: f64) -> Self {
+    /// Returns what players need that look ahead as many seconds of playing; files of each layer may come so much later.
+    pub(super) fn new(heads: &[Playhead], axis: Axis, ahead: f64, delays: Delays) -> Self {
         // NaN counts as 0.
         let player = |head: &Playhead| Player { course: Course::new(head, axis), delay: head.delay.max(0.0) };
         let mut players: Vec<Player> = heads.iter().map(player).collect();
         // Those of a crowd that plays in step.
         players.dedup();
-        Self { players, ahead, layer_seconds }
+        Self { players, ahead, delays }
     }
 
     /// Returns the urgency of a file: that for the player that needs it first.
@@ -85,7 +87,8 @@ impl Demand {
 
     /// Returns the urgency of a file that is reached in some seconds, by a player with some delay.
     fn urgency_in(&self, reached_in: f64, delay: f64, file: usize, chunk: &ChunkFile) -> Urgency {
-        let next_use = reached_in + delay + self.layer_seconds * f64::from(chunk.layer);
+        let layer = (chunk.layer as usize).min(self.delays.len() - 1);
+        let next_use = reached_in + delay + self.delays[layer];
         Urgency { file, is_wanted: reached_in <= self.ahead, reached_in, next_use, layer: chunk.layer }
     }
 }
@@ -146,7 +149,7 @@ impl Eq for Urgency {}
 
 #[cfg(test)]
 mod tests {
-    use super::super::fixture::random_head;
+    use super::super::fixture::{even_delays, random_head, table};
     use super::super::intervals::Intervals;
     use super::super::playhead::Turn;
     use super::*;
@@ -155,7 +158,7 @@ mod tests {
     /// Four stretches of a second.
     fn demand(heads: &[(f64, f64)], ahead: f64) -> Demand {
         let heads: Vec<Playhead> = heads.iter().map(|(seconds, velocity)| head(*seconds, *velocity, 0.0)).collect();
-        Demand::new(&heads, Axis::new(4.0, 4), ahead, 1.5)
+        Demand::new(&heads, Axis::new(4.0, 4), ahead, even_delays(1.5))
     }
 
     fn head(seconds: f64, velocity: f64, delay: f64) -> Playhead {
@@ -171,9 +174,24 @@ mod tests {
         let demand = demand(&[(0.5, 1.0)], 10.0);
         let seconds = |first: u32, layer| demand.urgency(0, &file([first, 3], layer)).seconds();
         assert_eq!([seconds(0, 0), seconds(0, 1), seconds(0, 2), seconds(2, 1)], [0.0, 1.5, 3.0, 3.0], "urgencies");
-        let fast = Demand::new(&[head(0.5, 1.0, 0.0)], Axis::new(4.0, 4), 10.0, 0.1);
+        let fast = Demand::new(&[head(0.5, 1.0, 0.0)], Axis::new(4.0, 4), 10.0, even_delays(0.1));
         let seconds = |first: u32, layer| fast.urgency(0, &file([first, 3], layer)).seconds();
         assert!(seconds(0, 3) < seconds(1, 0), "over a fast link, all layers of now before the next stretch");
+    }
+
+    #[test]
+    fn a_layer_of_little_utility_comes_after_the_first_layer_of_later() {
+        let table = |utilities: &[f32]| ChunkTable { utilities: utilities.to_vec(), ..table(4, &[]) };
+        let order = |utilities| {
+            let delays = table(utilities).delays().map(|delay| 1.4 * delay);
+            let demand = Demand::new(&[head(0.5, 1.0, 0.0)], Axis::new(4.0, 4), 10.0, delays);
+            let files = [file([0, 0], 1), file([1, 1], 0), file([2, 2], 0)];
+            let all: BTreeSet<Urgency> = (0..).zip(&files).map(|(number, file)| demand.urgency(number, file)).collect();
+            all.into_iter().map(|urgency| urgency.file).collect::<Vec<_>>()
+        };
+        assert_eq!(order(&[]), [1, 0, 2], "not measured: 1.4 s later");
+        assert_eq!(order(&[8.0, 6.0]), [0, 1, 2], "nearly the utility of layer 0");
+        assert_eq!(order(&[8.0, 0.01]), [1, 2, 0], "hardly any");
     }
 
     #[test]
@@ -187,7 +205,9 @@ mod tests {
 
     #[test]
     fn a_player_with_a_delay_comes_after_the_others() {
-        let delayed = |delay| Demand::new(&[head(0.5, 0.0, delay), head(2.5, 1.0, 0.0)], Axis::new(4.0, 4), 0.0, 1.5);
+        let delayed = |delay| {
+            Demand::new(&[head(0.5, 0.0, delay), head(2.5, 1.0, 0.0)], Axis::new(4.0, 4), 0.0, even_delays(1.5))
+        };
         let both = delayed(1e-3);
         let seconds = |stretch, layer| both.urgency(0, &file([stretch; 2], layer)).seconds();
         assert_eq!([seconds(0, 0), seconds(2, 0), seconds(2, 1)], [1e-3, 0.0, 1.5], "after layer 0 of the other");
@@ -246,7 +266,7 @@ mod tests {
                 &heads,
                 Axis::new(4.0, stretches),
                 f64::from(random.in_range(0.0, 6.0)),
-                f64::from(random.in_range(0.0, 2.0)),
+                even_delays(random.in_range(0.0, 2.0).into()),
             );
             let all = files.iter().enumerate().map(|(number, file)| demand.urgency(number, file));
             let mut expected: Vec<Urgency> = all.filter(|urgency| urgency.is_wanted).collect();

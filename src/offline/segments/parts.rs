@@ -8,7 +8,7 @@ use super::layers::{LayerShares, layers};
 use super::windows::{hulls, intervals};
 use crate::gaussian::Gaussian;
 use crate::scene::packed::runs::Part;
-use crate::scene::{TemporalFilter, TrainedWith};
+use crate::scene::{ChunkTable, TemporalFilter, TrainedWith};
 use rayon::prelude::*;
 
 /// Runs and layers of fewer Gaussians become part of others: a file costs more than they do.
@@ -55,13 +55,10 @@ pub(crate) fn lives(
     };
     let filter = filter.cloned().unwrap_or_else(support);
     let words = intervals(&filter).unwrap_or_else(|| hulls(&filter));
-    let (count, segments) = (u64::from(stretches), u64::from(filter.segments.max(1)));
     let life = |word: &u32| {
-        let (first, last) = (u64::from(word & 0xffff), u64::from(word >> 16));
+        let (first, last) = (word & 0xffff, word >> 16);
         // Of Gaussians that are never drawn, the last segment is the one at which they would be.
-        let first = first.min(last) * count / segments;
-        let last = ((last + 1) * count).div_ceil(segments).clamp(1, count) - 1;
-        [first.min(last) as u32, last as u32]
+        ChunkTable::stretches_of([first.min(last), last], filter.segments, stretches)
     };
     words.iter().map(life).collect()
 }

@@ -101,8 +101,23 @@ impl Split {
         (0..count).map(|number| folder.join(ChunkTable::file_name(number, count))).collect()
     }
 
+    /// Returns the number of layers.
+    pub fn layers(&self) -> u32 {
+        self.parts.iter().map(|part| part.layer + 1).max().unwrap_or_default()
+    }
+
+    /// Returns the capture without the layers from `count` on.
+    pub fn first_layers(&self, scene: &GaussianScene, count: u32) -> GaussianScene {
+        let of_first = self.parts.iter().filter(|part| part.layer < count);
+        let mut keep: Vec<u32> = of_first.flat_map(|part| &part.gaussians).copied().collect();
+        keep.sort_unstable();
+        scene.select(&keep)
+    }
+
     /// Writes the chunk files of the capture into a folder, which exists, and then their index: where it is, all files
-    /// are complete. `level` is the zstd level, `None` the usual one. Begins the task "writing".
+    /// are complete. `level` is the zstd level, `None` the usual one. `psnrs` are those of held-out views without a layer,
+    /// with the first, with the first two and so on, dB, from which the index has the utilities of the layers; empty if they
+    /// were not measured. Begins the task "writing".
     ///
     /// # Errors
     /// Files that cannot be written, an interruption.
@@ -111,6 +126,7 @@ impl Split {
         segment: &Segment,
         folder: &Path,
         level: Option<i32>,
+        psnrs: &[f64],
         progress: &mut dyn Progress,
     ) -> Result<Chunks, SegmentsError> {
         progress.begin("writing", self.parts.len() + 1);
@@ -134,10 +150,12 @@ impl Split {
             progress.advance();
         }
         proceed(progress)?;
+        let files_of = || files.iter().map(|chunk| chunk.file);
         let table = ChunkTable {
             stretches: self.stretches,
             gaussian_bytes: segment.scene.gaussian_bytes(),
-            files: files.iter().map(|chunk| chunk.file).collect(),
+            files: files_of().collect(),
+            utilities: utilities(psnrs, files_of()),
         };
         let chunks = Some(Arc::new(table.clone()));
         let scene = GaussianScene { filter: None, chunks, ..segment.scene.select(&[]) };
@@ -153,6 +171,14 @@ impl Split {
         let time = |stretch: u32| first + (last - first) * f64::from(stretch) / f64::from(self.stretches);
         [time(stretches[0]), time(stretches[1] + 1)]
     }
+}
+
+/// Returns the utility of each layer, dB per megabyte of its files, given the PSNR without a layer, with the first, with the
+/// first two and so on.
+fn utilities(psnrs: &[f64], files: impl Iterator<Item = ChunkFile> + Clone) -> Vec<f32> {
+    let bytes = |layer: u32| files.clone().filter(|file| file.layer == layer).map(|file| file.bytes).sum::<u64>();
+    let gains = psnrs.windows(2).map(|pair| pair[1] - pair[0]);
+    (0..).zip(gains).map(|(layer, gain)| (gain * 1e6 / bytes(layer).max(1) as f64) as f32).collect()
 }
 
 /// Removes the index of an earlier split: its table is not that of the files that are written now.
@@ -196,7 +222,7 @@ mod tests {
     fn cut(whole: &Segment, shares: &[u32], folder: &Path) -> (Split, Chunks) {
         let shares = LayerShares::new(shares.to_vec()).expect("shares of 100 in all");
         let split = Split::of(whole, 8, &shares).expect("every Gaussian can be drawn");
-        let chunks = split.write(whole, folder, Some(1), &mut NoProgress).expect("files can be written");
+        let chunks = split.write(whole, folder, Some(1), &[], &mut NoProgress).expect("files can be written");
         (split, chunks)
     }
 
@@ -259,6 +285,28 @@ mod tests {
     }
 
     #[test]
+    fn the_index_has_the_utilities_of_measured_layers() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let whole = whole();
+        let (split, chunks) = cut(&whole, &[25, 25, 50], folder.path());
+        assert!(chunks.table.utilities.is_empty(), "not measured");
+        let counts: Vec<usize> = (0..=3).map(|count| split.first_layers(&whole.scene, count).len()).collect();
+        assert_eq!((split.layers(), counts[0], counts[3]), (3, 0, COUNT), "no layer, and all");
+        assert!(counts.windows(2).all(|pair| pair[0] < pair[1]), "each layer adds Gaussians: {counts:?}");
+        let chunks = split.write(&whole, folder.path(), Some(1), &[10.0, 22.0, 25.0, 24.5], &mut NoProgress);
+        let table = chunks.expect("files can be written").table;
+        let bytes =
+            |layer| (table.bytes_up_to(layer) - layer.checked_sub(1).map_or(0, |l| table.bytes_up_to(l))) as f64;
+        let expected = [12e6 / bytes(0), 3e6 / bytes(1), -0.5e6 / bytes(2)];
+        assert_eq!(table.utilities.len(), 3, "one for each layer");
+        for (found, expected) in table.utilities.iter().zip(expected) {
+            assert!((f64::from(*found) / expected - 1.0).abs() < 1e-6, "{found}, {expected} dB per megabyte");
+        }
+        let index = read(&folder.path().join(ChunkTable::INDEX)).scene;
+        assert_eq!(index.chunks.expect("a table").utilities, table.utilities, "read again");
+    }
+
+    #[test]
     fn the_index_has_everything_but_the_gaussians() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let mut whole = whole();
@@ -287,7 +335,7 @@ mod tests {
         let whole = whole();
         let (split, chunks) = cut(&whole, &[100], folder.path());
         assert!(chunks.index.exists(), "an index");
-        let interrupted = split.write(&whole, folder.path(), Some(1), &mut InterruptedProgress);
+        let interrupted = split.write(&whole, folder.path(), Some(1), &[], &mut InterruptedProgress);
         assert!(matches!(interrupted, Err(SegmentsError::Interrupted(_))), "the second split is interrupted");
         assert!(!chunks.index.exists(), "the files may be of two splits");
     }

@@ -59,3 +59,4 @@ pub use systems::PlaybackSystems;
 pub use timeline::{
     Clip, ClipFade, InvalidTimeline, Timeline, TimelineError, TimelineLoader, TimelinePlayer, TimelineTrack, Track,
 };
+pub(crate) use timeline::{Cue, NextClip};

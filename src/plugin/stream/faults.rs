@@ -3,14 +3,11 @@
 //! In: what is there of a capture in chunk files, a time, its share of the budget. Out: a [`CaptureFailure`] with the remedy, if
 //! something is in the way that time alone does not mend.
 
-use crate::codec::stream::StreamSchedule;
+use crate::codec::stream::{Obstacle, StreamSchedule};
 use crate::plugin::asset::CaptureFailure;
 use crate::plugin::component::GaussianCapture;
 use crate::scene::ChunkTable;
 use bevy::asset::{AssetId, AssetPath};
-
-/// Failures of a file in a row that are a fault: about four seconds of them.
-const MANY: u32 = 5;
 
 /// Returns why the most important Gaussians of a time may never be there: seconds since the start of a capture, whose
 /// index is at a path, within its share of the bytes on the GPU.
@@ -20,20 +17,20 @@ pub(super) fn fault(
     share: u64,
     index: &AssetPath<'_>,
 ) -> Option<CaptureFailure> {
-    let table = schedule.table();
-    let is_first = |file: &usize| table.files.get(*file).is_some_and(|chunk| chunk.layer == 0);
-    let first_layer: Vec<usize> = schedule.needed_at(seconds).filter(is_first).collect();
-    let needed = first_layer.iter().map(|file| schedule.gpu_bytes_of(*file)).fold(0, u64::saturating_add);
-    if needed > share {
-        return Some(CaptureFailure::OverBudget { path: index.to_string(), needed, limit: share });
-    }
-    let failing = first_layer.into_iter().find(|file| schedule.failures_in_a_row(*file) >= MANY)?;
-    let name = ChunkTable::file_name(failing, table.files.len());
+    let path = || index.to_string();
+    let file = match schedule.obstacle(seconds, share)? {
+        Obstacle::OverBudget { needed } => {
+            return Some(CaptureFailure::OverBudget { path: path(), needed, limit: share });
+        }
+        Obstacle::Failing { file } => file,
+    };
+    let name = ChunkTable::file_name(file, schedule.table().files.len());
     let reason = format!(
-        "its file {name} could not be loaded {MANY} times in a row, for the reasons in the log, and is tried again: \
-         check that the folder of the index has all files that were made with it"
+        "its file {name} could not be loaded {} times in a row, for the reasons in the log, and is tried again: \
+         check that the folder of the index has all files that were made with it",
+        Obstacle::MANY
     );
-    Some(CaptureFailure::Unreadable { path: index.to_string(), reason })
+    Some(CaptureFailure::Unreadable { path: path(), reason })
 }
 
 /// Returns the fault of an index that was not loaded from a file.
@@ -53,7 +50,7 @@ mod tests {
     fn schedule() -> StreamSchedule {
         let file = |stretch, layer, gaussians| ChunkFile { stretches: [stretch; 2], layer, gaussians, bytes: 1 };
         let files = vec![file(0, 0, 10), file(1, 0, 30), file(1, 1, 99)];
-        StreamSchedule::new(ChunkTable { stretches: 2, gaussian_bytes: 100, files }.into(), 2.0)
+        StreamSchedule::new(ChunkTable { stretches: 2, gaussian_bytes: 100, files, utilities: Vec::new() }.into(), 2.0)
     }
 
     #[test]
@@ -77,7 +74,7 @@ mod tests {
         let mut schedule = schedule();
         let head = Playhead { seconds: 1.5, velocity: 0.0, range: [0.0, 2.0], turn: Turn::Loop, delay: 0.0 };
         let fault = |schedule: &StreamSchedule| fault(schedule, 1.5, u64::MAX, &AssetPath::from("take/index.gs4d"));
-        for number in 0..MANY {
+        for number in 0..Obstacle::MANY {
             assert_eq!(fault(&schedule), None, "{number} failures are none yet");
             // Later than any retry.
             let now = 10.0 * f64::from(number);

@@ -31,7 +31,6 @@ mod settings;
 mod shares;
 mod state;
 mod streams;
-mod throughput;
 
 pub use messages::{CaptureBuffered, CaptureBuffering, CaptureStalled};
 pub use plugin::{CaptureStreamPlugin, CaptureStreamSystems};

@@ -1,19 +1,18 @@
 //! Streams: the chunk files of each capture, loaded and given up as its players need them.
 //!
-//! In: captures whose scene is an index of chunk files, the playbacks of their entities, cameras, [`StreamBudget`]. Out:
-//! [`Streams`], which holds a handle to each file that is there or on its way: the asset server loads files with their
-//! first handle, and frees them with their last.
+//! In: captures whose scene is an index of chunk files, the playbacks of their entities, the next clips of timelines,
+//! cameras, [`StreamBudget`]. Out: [`Streams`], which holds a handle to each file that is there or on its way: the asset
+//! server loads files with their first handle, and frees them with their last.
 
 use super::faults::{fault, without_folder};
-use super::heads::{playhead, still};
+use super::heads::playhead;
 use super::settings::{CaptureStreamSettings, StreamBudget};
 use super::shares::{OnTheWay, Sight, ask_in_turns, shares};
 use super::state::CaptureStreamState;
-use super::throughput::Throughput;
-use crate::codec::stream::{FileState, Playhead, StreamLimits, StreamSchedule};
+use crate::codec::stream::{FileState, Playhead, StreamLimits, StreamSchedule, Throughput, Turn};
 use crate::plugin::asset::{CaptureFailure, CaptureLoaderSettings, Uploads};
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
-use crate::plugin::playback::Playback;
+use crate::plugin::playback::{Cue, NextClip, Playback};
 use crate::plugin::render::logged::error_once_each;
 use crate::scene::{ChunkTable, ColorCodebooks};
 use bevy::asset::{AssetId, AssetPath, AssetServer, Assets, Handle, RenderAssetUsages};
@@ -59,6 +58,29 @@ impl Streams {
         self.now
     }
 
+    /// Begins the stream of a loaded capture, unless it has begun or the capture is not in chunk files. Returns `false` if
+    /// the capture has no stream now: the files of an index that has been loaded again may be others, and those on a lost
+    /// device are gone, so that they are loaded in the next frame, when those of before are no longer assets.
+    fn begin(
+        &mut self,
+        id: AssetId<GaussianCapture>,
+        capture: &GaussianCapture,
+        server: &AssetServer,
+        is_device_new: bool,
+    ) -> bool {
+        let Some(table) = &capture.scene().chunks else { return false };
+        match self.streams.get(&id).map(|stream| Arc::ptr_eq(stream.schedule.table(), table)) {
+            Some(is_same) => is_same && !is_device_new,
+            None => {
+                let index = server.get_path(id).map(AssetPath::into_owned);
+                let codebooks = capture.scene().form.coded_colors().map(|colors| colors.codebooks.clone());
+                let stream = Stream::new(table.clone(), capture.duration_seconds(), index);
+                self.streams.insert(id, Stream { codebooks, ..stream });
+                true
+            }
+        }
+    }
+
     /// Returns the stream of a capture; `None` if it is not in chunk files.
     pub(super) fn of(&self, capture: AssetId<GaussianCapture>) -> Option<&Stream> {
         self.streams.get(&capture)
@@ -77,16 +99,10 @@ pub(super) struct Stream {
     reloaded: HashSet<usize>,
     /// Its share of the memory on the GPU, bytes.
     share: u64,
-    /// Bytes of its files for each second of playing at speed 1.
-    bytes_per_second: f64,
-    /// Bytes of all its files on the GPU.
-    all_bytes: u64,
 }
 
 impl Stream {
     fn new(table: Arc<ChunkTable>, duration: f32, index: Option<AssetPath<'static>>) -> Self {
-        let all_bytes = (0..table.files.len()).map(|file| table.page_bytes(file)).fold(0, u64::saturating_add);
-        let bytes_per_second = table.bytes_up_to(ChunkTable::MOST_LAYERS) as f64 / f64::from(duration);
         Self {
             schedule: StreamSchedule::new(table, duration.into()).in_pages(),
             index,
@@ -94,20 +110,7 @@ impl Stream {
             files: HashMap::new(),
             reloaded: HashSet::new(),
             share: 0,
-            bytes_per_second,
-            all_bytes,
         }
-    }
-
-    /// Returns the bytes per second that its players need.
-    fn needed(&self, heads: &[Playhead]) -> f64 {
-        self.bytes_per_second * heads.iter().map(|head| head.velocity.abs()).fold(1.0, f64::max)
-    }
-
-    /// Returns whether about all that is ahead of a player, and as much behind it, has room in so many bytes.
-    fn has_room(&self, gpu_bytes: u64, ahead: f32) -> bool {
-        let share = 2.0 * f64::from(ahead) / self.schedule.duration();
-        self.all_bytes as f64 * share.min(1.0) <= gpu_bytes as f64
     }
 
     /// Returns the handle of a file that is there.
@@ -241,6 +244,7 @@ pub(super) fn fetch_files(
     uploads: Res<Uploads>,
     budget: Res<StreamBudget>,
     placed: Query<Placed>,
+    tracks: Query<(&NextClip, &GlobalTransform)>,
     cameras: Query<(&Camera, &GlobalTransform)>,
     device: Option<Res<RenderDevice>>,
     mut streams: ResMut<Streams>,
@@ -256,30 +260,30 @@ pub(super) fn fetch_files(
     for (handle, playback, place, visibility, settings, state) in &placed {
         let id = handle.0.id();
         let Some(capture) = captures.get(id) else { continue };
-        let Some(table) = &capture.scene().chunks else { continue };
-        let duration = capture.duration_seconds();
-        match streams.streams.get(&id).map(|stream| Arc::ptr_eq(stream.schedule.table(), table)) {
-            Some(true) if !is_device_new => {}
-            // The files of an index that has been loaded again may be others: they are loaded in the next frame, when
-            // those of before are no longer assets.
-            Some(_) => {
-                wanted.remove(&id);
-                continue;
-            }
-            None => {
-                let index = server.get_path(id).map(AssetPath::into_owned);
-                let codebooks = capture.scene().form.coded_colors().map(|colors| colors.codebooks.clone());
-                let stream = Stream { codebooks, ..Stream::new(table.clone(), duration, index) };
-                streams.streams.insert(id, stream);
-            }
+        if !streams.begin(id, capture, &server, is_device_new) {
+            wanted.remove(&id);
+            continue;
         }
         let (heads, sight) = wanted.entry(id).or_default();
-        heads.push(playhead(playback, duration));
+        heads.push(playhead(playback, capture.duration_seconds()));
         // The picture that stays needs its files.
         let held = state.filter(|state| !state.is_coarse).and_then(|state| state.seconds);
         let preload = settings.iter().flat_map(|settings| settings.preload.iter().copied());
-        heads.extend(held.into_iter().chain(preload).map(still));
+        heads.extend(held.into_iter().chain(preload).map(|seconds| Playhead::still(seconds.into())));
         sight.add(visibility.get(), place.translation(), &eyes);
+    }
+    let ahead = f64::from(budget.ahead_seconds);
+    let cues =
+        tracks.iter().filter_map(|(next, place)| Some((next.0.as_ref().filter(|cue| cue.after <= ahead)?, place)));
+    for (cue, place) in cues {
+        let id = cue.capture.id();
+        let Some(capture) = captures.get(id) else { continue };
+        if streams.begin(id, capture, &server, is_device_new) {
+            let Cue { seconds, velocity, range, after: delay, .. } = *cue;
+            let (heads, sight) = wanted.entry(id).or_default();
+            heads.push(Playhead { seconds, velocity, range, turn: Turn::Stop, delay });
+            sight.add(false, place.translation(), &eyes);
+        }
     }
     streams.streams.retain(|id, _| {
         let stays = wanted.contains_key(id);
@@ -291,7 +295,12 @@ pub(super) fn fetch_files(
     let is_busy = streams.streams.values().any(|stream| stream.schedule.requested() > 0);
     let notice = |(id, stream): (&_, &mut Stream)| stream.notice(*id, now, &server, &captures, &uploads);
     let arrived = streams.streams.iter_mut().map(notice).sum();
-    let needed = streams.streams.values().zip(wanted.values()).map(|(stream, (heads, _))| stream.needed(heads)).sum();
+    let needed = streams
+        .streams
+        .values()
+        .zip(wanted.values())
+        .map(|(stream, (heads, _))| stream.schedule.bytes_per_second(heads))
+        .sum();
     streams.throughput.add(now - before, is_busy, arrived, needed);
     let throughput = streams.throughput;
     let shares = shares(wanted.values().map(|(_, sight)| sight));
@@ -307,7 +316,7 @@ pub(super) fn fetch_files(
         uploads.grant(*id, gpu_bytes);
         stream.share = gpu_bytes;
         // Where memory is short, the first layer of what is played next comes before the last layer of now.
-        let layer_seconds = match stream.has_room(gpu_bytes, budget.ahead_seconds) {
+        let layer_seconds = match stream.schedule.has_room(gpu_bytes, budget.ahead_seconds.into()) {
             true => throughput.layer_seconds(),
             false => StreamLimits::LAYER_SECONDS,
         };
@@ -365,13 +374,20 @@ mod tests {
         app.register_asset_source("endless", AssetSourceBuilder::new(move || Box::new(source.clone())));
         app.add_plugins((MinimalPlugins, AssetPlugin::default(), CaptureAssetPlugin));
         let files = vec![ChunkFile { stretches: [0, 0], layer: 0, gaussians: 1, bytes: 1 }];
-        let table = ChunkTable { stretches: 1, gaussian_bytes: 88, files };
+        let table = ChunkTable { stretches: 1, gaussian_bytes: 88, files, utilities: Vec::new() };
         let mut stream = Stream::new(table.into(), 1.0, Some("endless://index.gs4d".into()));
         // The first request, its deadline, and the second request.
         for (now, is_requested, count) in [(0.0, true, 1), (31.0, false, 1), (31.5, true, 2)] {
             let server = app.world().resource::<AssetServer>().clone();
             let uploads = Uploads::default();
-            stream.follow(AssetId::default(), now, &[still(0.0)], &StreamLimits::default(), &server, &uploads);
+            stream.follow(
+                AssetId::default(),
+                now,
+                &[Playhead::still(0.0)],
+                &StreamLimits::default(),
+                &server,
+                &uploads,
+            );
             let state = (stream.files.len() == 1, stream.schedule.requested() == 1);
             assert_eq!(state, (is_requested, is_requested), "at {now} s the file is on its way, or is not");
             let began = Instant::now();

@@ -5,17 +5,16 @@
 //! by one dispatch.
 
 use super::buffers::{self, Filling};
-use super::instance_settings::settings;
+use super::instance_settings::{settings, stride};
 use super::paged_gaussians::PagedGaussians;
 use super::prefixes::Prefixes;
-use crate::gaussian::harmonics::evaluated;
 use crate::renderer::device::GpuError;
 use crate::renderer::device::memory::{Allocator, binding_limit};
 use crate::renderer::layout::{self, BLOCK, InstanceUniforms};
 use crate::renderer::pipelines::Renderer;
 use crate::renderer::shaders::Storage;
 use crate::scene::filter::segment_of;
-use crate::scene::{ActiveSets, Bounds, ColorDegrees, FilterKind, RuntimeScene, TemporalFilter};
+use crate::scene::{ActiveSets, Bounds, FilterKind, RuntimeScene, TemporalFilter};
 use glam::Vec4;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -167,8 +166,7 @@ impl GpuCapture {
     ) -> Result<(Self, Vec<Filling>), GpuError> {
         scene.check().map_err(GpuError::Scene)?;
         let (allocator, form) = (renderer.allocator(device), &scene.form);
-        let ColorDegrees { degree, degree_t, .. } = form.color_degrees();
-        let stride = (evaluated(degree, degree_t) * 3).div_ceil(4);
+        let stride = stride(scene);
         let per_part = per_part(&device.limits(), scene, stride)?;
         let storage = Storage::of(form);
         let (mut parts, mut fillings) = (Vec::new(), Vec::new());
@@ -201,7 +199,7 @@ impl GpuCapture {
             prefixes: Prefixes::of(scene),
             bytes,
             bounds: None,
-            settings: settings(scene, stride),
+            settings: settings(scene),
             len: scene.len(),
         };
         if let Some(filter) = &scene.filter {

@@ -4,18 +4,19 @@
 
 use super::buffers;
 use crate::gaussian::ShDirection;
+use crate::gaussian::harmonics::evaluated;
 use crate::renderer::layout::InstanceUniforms;
 use crate::scene::packed::MAX_STAGES;
 use crate::scene::{CodedColors, ColorDegrees, RuntimeScene};
 
 /// Returns the color and time settings of a scene as uniforms, with zero in place of all others.
-pub(super) fn settings(scene: &RuntimeScene, stride: usize) -> InstanceUniforms {
+pub(super) fn settings(scene: &RuntimeScene) -> InstanceUniforms {
     let (trained_with, colors) = (&scene.trained_with, scene.form.coded_colors());
     let ColorDegrees { degree, degree_t, .. } = scene.form.color_degrees();
     InstanceUniforms {
         degree,
         degree_t: if degree == 3 { degree_t } else { 0 },
-        stride: colors.map_or(stride, buffers::entry_words) as u32,
+        stride: colors.map_or_else(|| stride(scene), buffers::entry_words) as u32,
         stages: colors.map_or(0, |colors| colors.codebooks.entries.len() as u32),
         first_entries: colors.map(first_entries).unwrap_or_default(),
         displaced: u32::from(trained_with.sh_direction == ShDirection::Displaced),
@@ -23,6 +24,12 @@ pub(super) fn settings(scene: &RuntimeScene, stride: usize) -> InstanceUniforms 
         marginal_cutoff: trained_with.marginal_cutoff,
         ..bytemuck::Zeroable::zeroed()
     }
+}
+
+/// Returns the number of four-vectors of color coefficients per Gaussian.
+pub(super) fn stride(scene: &RuntimeScene) -> usize {
+    let ColorDegrees { degree, degree_t, .. } = scene.form.color_degrees();
+    (evaluated(degree, degree_t) * 3).div_ceil(4)
 }
 
 /// Returns the index of the first entry of each codebook among all entries.

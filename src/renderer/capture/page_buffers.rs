@@ -74,11 +74,6 @@ impl PageBuffer {
         Self { kind, buffer: buffers::storage(allocator, kind.kind.label, kind.offset(pages) as usize) }
     }
 
-    /// Creates a buffer of the same kind.
-    pub(super) fn another(&self, allocator: Allocator<'_>, pages: u32) -> Self {
-        Self::new(allocator, self.kind, pages)
-    }
-
     /// Writes what is before the first page: the ranges that all files share.
     pub(super) fn write_shared(&self, queue: &wgpu::Queue, shared: &[[f32; 4]]) {
         if self.kind.before > 0 {

@@ -1,19 +1,16 @@
 //! The Gaussians of a capture in chunk files, on the GPU.
 //!
-//! In: files, one after another. Out: [`PagedGaussians`], which knows the buffers, the pages of each file and what all files
-//! have in common, and refuses files that have it not.
+//! In: files, one after another. Out: [`PagedGaussians`], which knows the buffers, the pages of each file, and what all files
+//! have in common: a file that differs is refused.
 
 use super::instance_settings::settings;
-use super::page_buffers::PageBuffer;
+use super::page_buffers::{PageBuffer, PageKind};
 use super::pages::{Pages, PartListing};
-use crate::gaussian::harmonics::evaluated;
 use crate::renderer::device::GpuError;
 use crate::renderer::layout::{InstanceUniforms, PAGE};
 use crate::renderer::shaders::Storage;
 use crate::scene::packed::SHARED_RANGES;
-use crate::scene::{
-    ActiveSets, ChunkTable, ColorCodebooks, ColorDegrees, FilterKind, Form, RuntimeScene, TemporalFilter,
-};
+use crate::scene::{ActiveSets, ChunkTable, ColorCodebooks, FilterKind, Form, RuntimeScene, TemporalFilter};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -22,7 +19,9 @@ use std::sync::Arc;
 pub(in crate::renderer) struct PagedGaussians {
     pub(super) table: Arc<ChunkTable>,
     pub(super) pages: Pages,
-    /// The buffers of each part: geometry, color, active sets if there is a filter.
+    /// The kinds of buffers: geometry, color, active sets if there is a filter.
+    pub(super) kinds: Vec<PageKind>,
+    /// The buffers of each part, of these kinds.
     pub(super) buffers: Vec<Vec<PageBuffer>>,
     /// The codebooks and their buffer, if colors are coded.
     pub(super) codebooks: Option<(Arc<ColorCodebooks>, wgpu::Buffer)>,
@@ -59,7 +58,7 @@ impl Shared {
         };
         Self {
             storage: Storage::of(&scene.form),
-            settings: settings(scene, stride(scene)),
+            settings: settings(scene),
             ranges: ranges.to_vec(),
             interval: scene.trained_with.time_interval,
             segments: scene.filter.as_ref().map_or(0, |filter| filter.segments),
@@ -80,12 +79,6 @@ pub(super) fn are_same(a: Option<&Arc<ColorCodebooks>>, b: Option<&Arc<ColorCode
         (None, None) => true,
         (Some(_), None) | (None, Some(_)) => false,
     }
-}
-
-/// Returns the number of four-vectors of color coefficients per Gaussian.
-pub(super) fn stride(scene: &RuntimeScene) -> usize {
-    let ColorDegrees { degree, degree_t, .. } = scene.form.color_degrees();
-    (evaluated(degree, degree_t) * 3).div_ceil(4)
 }
 
 impl PagedGaussians {
@@ -156,11 +149,11 @@ impl PagedGaussians {
 
 /// Returns numbers of each segment of time, or 0 in segments that have none of the stretches of a file.
 fn within_stretches(table: &ChunkTable, file: usize, mut counts: Vec<u32>) -> Vec<u32> {
-    let [first, last] = table.files.get(file).map_or([1, 0], |chunk| chunk.stretches.map(u64::from));
-    let (stretches, segments) = (u64::from(table.stretches), counts.len() as u64);
+    let [first, last] = table.files.get(file).map_or([1, 0], |chunk| chunk.stretches);
+    let segments = counts.len() as u32;
     for (segment, count) in (0..).zip(&mut counts) {
-        let own = segment * stretches / segments..=((segment + 1) * stretches).div_ceil(segments) - 1;
-        if *own.end() < first || *own.start() > last {
+        let own = ChunkTable::stretches_of([segment; 2], segments, table.stretches);
+        if own[1] < first || own[0] > last {
             *count = 0;
         }
     }

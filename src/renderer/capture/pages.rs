@@ -212,12 +212,12 @@ pub(super) fn all_pages(table: &ChunkTable) -> u64 {
 /// Returns the largest number of Gaussians that the files of a capture list in any of `segments` segments; if `in_pages`, in
 /// whole pages, and in any two segments that follow each other.
 pub(super) fn most_listed(table: &ChunkTable, segments: u32, in_pages: bool) -> u64 {
-    let (stretches, segments) = (u64::from(table.stretches.max(1)), u64::from(segments.max(1)));
+    let (stretches, segments) = (table.stretches.max(1), segments.max(1));
     let size = |gaussians: u64| if in_pages { gaussians.next_multiple_of(PAGE.into()) } else { gaussians };
     // The Gaussians of files that begin in a stretch or before it, and of those that end before it.
     let (mut begun, mut ended) = (vec![0; stretches as usize], vec![0; stretches as usize + 1]);
     for file in &table.files {
-        let [first, last] = file.stretches.map(|stretch| stretch.min(stretches as u32 - 1) as usize);
+        let [first, last] = file.stretches.map(|stretch| stretch.min(stretches - 1) as usize);
         begun[first] += size(file.gaussians);
         ended[last + 1] += size(file.gaussians);
     }
@@ -231,9 +231,9 @@ pub(super) fn most_listed(table: &ChunkTable, segments: u32, in_pages: bool) -> 
     sum_up(&mut begun);
     sum_up(&mut ended);
     // Of a segment that several stretches have, the files of all of them.
-    let of_segment = |segment: u64| {
-        let after = (segment + if in_pages { 2 } else { 1 }).min(segments);
-        let (first, last) = (segment * stretches / segments, (after * stretches).div_ceil(segments) - 1);
+    let of_segment = |segment: u32| {
+        let last = (segment + u32::from(in_pages)).min(segments - 1);
+        let [first, last] = ChunkTable::stretches_of([segment, last], segments, stretches);
         begun[last as usize] - ended[first as usize]
     };
     (0..segments).map(of_segment).max().unwrap_or_default()
@@ -321,7 +321,7 @@ mod tests {
     fn most_listed_is_a_bound_for_every_segment() {
         let file = |stretches, gaussians| ChunkFile { stretches, layer: 0, gaussians, bytes: 1 };
         let files = vec![file([0, 3], 10), file([0, 0], 20), file([1, 2], 300), file([2, 2], 5), file([3, 3], 400)];
-        let table = ChunkTable { stretches: 4, gaussian_bytes: 1, files };
+        let table = ChunkTable { stretches: 4, gaussian_bytes: 1, files, utilities: Vec::new() };
         assert_eq!(all_pages(&table), 7, "whole pages");
         assert_eq!(most_listed(&table, 4, false), 410, "the last stretch");
         assert_eq!(most_listed(&table, 8, false), 410, "two segments for each stretch");

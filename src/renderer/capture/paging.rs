@@ -5,11 +5,12 @@
 
 use super::buffers;
 use super::gpu_capture::{Filter, GpuCapture, Part, next_id, per_part};
+use super::instance_settings::stride;
 use super::page_buffers::{PageBuffer, PageKind};
-use super::paged_gaussians::{PagedGaussians, Shared, are_same, codebooks_of, stride};
+use super::paged_gaussians::{PagedGaussians, Shared, are_same, codebooks_of};
 use super::pages::{Pages, all_pages, most_listed};
 use crate::renderer::device::GpuError;
-use crate::renderer::device::memory::catch_known;
+use crate::renderer::device::memory::{Allocator, catch_known};
 use crate::renderer::layout::{self, PAGE};
 use crate::renderer::pipelines::Renderer;
 use crate::scene::{ActiveSets, ChunkTable, RuntimeScene};
@@ -71,19 +72,14 @@ impl GpuCapture {
         let allocator = renderer.allocator(device);
         let mut kinds = PageKind::of_gaussians(&first.form, stride(first)).to_vec();
         kinds.extend(first.filter.as_ref().map(PageKind::of_filter));
-        let own: u64 = kinds.iter().map(PageKind::page_bytes).sum();
+        let written_bytes: u64 = kinds.iter().map(PageKind::page_bytes).sum();
         let page_bytes = u64::from(table.gaussian_bytes) * u64::from(PAGE);
-        if own > page_bytes {
+        if written_bytes > page_bytes {
             return Err(GpuError::Scene("its Gaussians take more bytes than the index of the chunk files says"));
         }
         let per_part = (per_part(&device.limits(), first, stride(first))? / PAGE as usize) as u32;
         let pages = Pages::new(pages_within(table, page_bytes, bytes), per_part);
-        let of_part = |pages: u32| kinds.iter().map(|kind| PageBuffer::new(allocator, *kind, pages)).collect();
-        let create = || pages.of_parts().map(of_part).collect::<Vec<Vec<PageBuffer>>>();
-        let buffers = catch_known(device, u64::from(pages.count()) * own, create)?;
-        for buffer in buffers.iter().flatten() {
-            buffer.write_shared(queue, &shared.ranges);
-        }
+        let buffers = page_buffers(allocator, queue, &kinds, &pages, &shared)?;
         let codebooks = first.form.coded_colors().map(|colors| {
             let (buffer, filling) = renderer.codebooks.claim(allocator, colors);
             if let Some(mut filling) = filling {
@@ -98,11 +94,12 @@ impl GpuCapture {
         let paged = PagedGaussians {
             table: table.clone(),
             pages,
+            kinds,
             buffers,
             codebooks,
             has_bits,
             page_bytes,
-            written_bytes: own,
+            written_bytes,
             all: table.files.iter().map(|file| file.gaussians).sum(),
             shared,
         };
@@ -125,14 +122,8 @@ impl GpuCapture {
         let Some(paged) = &self.pages else { return Ok(false) };
         let count = pages_within(&paged.table, paged.page_bytes, bytes);
         let moved = (count != paged.count()).then(|| paged.pages.moved(count)).flatten();
-        let (Some((pages, moves)), Some(first)) = (moved, paged.buffers.first()) else { return Ok(false) };
-        let allocator = renderer.allocator(device);
-        let of_part = |pages: u32| first.iter().map(|buffer| buffer.another(allocator, pages)).collect();
-        let create = || pages.of_parts().map(of_part).collect::<Vec<Vec<PageBuffer>>>();
-        let buffers = catch_known(device, u64::from(count) * paged.written_bytes, create)?;
-        for buffer in buffers.iter().flatten() {
-            buffer.write_shared(queue, &paged.shared.ranges);
-        }
+        let Some((pages, moves)) = moved else { return Ok(false) };
+        let buffers = page_buffers(renderer.allocator(device), queue, &paged.kinds, &pages, &paged.shared)?;
         let label = wgpu::CommandEncoderDescriptor { label: Some("gs4d pages") };
         let mut encoder = device.create_command_encoder(&label);
         let parts = |[from, to]: [u32; 2]| (paged.pages.local(from).0, pages.local(to).0);
@@ -219,6 +210,25 @@ impl GpuCapture {
         });
         self.pages = Some(paged);
     }
+}
+
+/// Creates the buffers of each part, of these kinds, with what all files share.
+///
+/// # Errors
+/// When the device has no memory for them.
+fn page_buffers(
+    allocator: Allocator<'_>,
+    queue: &wgpu::Queue,
+    kinds: &[PageKind],
+    pages: &Pages,
+    shared: &Shared,
+) -> Result<Vec<Vec<PageBuffer>>, GpuError> {
+    let of_part = |pages: u32| kinds.iter().map(|kind| PageBuffer::new(allocator, *kind, pages)).collect();
+    let create = || pages.of_parts().map(of_part).collect::<Vec<Vec<PageBuffer>>>();
+    let needed = u64::from(pages.count()) * kinds.iter().map(PageKind::page_bytes).sum::<u64>();
+    let buffers = catch_known(allocator.device, needed, create)?;
+    buffers.iter().flatten().for_each(|buffer| buffer.write_shared(queue, &shared.ranges));
+    Ok(buffers)
 }
 
 /// Most pages of a capture: a thousand million Gaussians.

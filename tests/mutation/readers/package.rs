@@ -157,7 +157,7 @@ fn cut() -> GaussianScene {
 fn index() -> GaussianScene {
     let file = |first, last, layer| ChunkFile { stretches: [first, last], layer, gaussians: 300, bytes: 9_000 };
     let files = vec![file(0, 0, 0), file(0, 3, 0), file(0, 3, 1), file(2, 3, 0)];
-    let table = ChunkTable { stretches: 4, gaussian_bytes: 88, files };
+    let table = ChunkTable { stretches: 4, gaussian_bytes: 88, files, utilities: Vec::new() };
     let empty = synthesize(&SynthSettings { count: 0, ..SynthSettings::default() });
     GaussianScene { chunks: Some(Arc::new(table)), ..empty }
 }

@@ -25,6 +25,7 @@ mod asset;
 mod clip;
 mod error;
 mod file;
+mod next;
 mod player;
 mod systems;
 
@@ -32,5 +33,6 @@ pub use asset::{Timeline, Track};
 pub use clip::Clip;
 pub use error::InvalidTimeline;
 pub use file::{TimelineError, TimelineLoader};
+pub(crate) use next::{Cue, NextClip};
 pub use player::{ClipFade, TimelinePlayer, TimelineTrack};
 pub(super) use systems::{advance_timelines, bind_tracks, update_tracks};

@@ -4,6 +4,7 @@
 
 use super::asset::Timeline;
 use super::clip::Clip;
+use super::next::NextClip;
 use crate::plugin::component::GaussianCapture3d;
 use crate::plugin::playback::clock::PlaybackClock;
 use crate::plugin::playback::component::Playback;
@@ -66,7 +67,7 @@ pub struct TimelinePlayer(pub Handle<Timeline>);
 #[derive(Component, Reflect, Debug, Default, Clone, PartialEq, Eq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
 #[type_path = "bevy_gs4d::playback"]
-#[require(GaussianCapture3d, ClipFade, PlayedClip)]
+#[require(GaussianCapture3d, ClipFade, PlayedClip, NextClip)]
 pub struct TimelineTrack(pub String);
 
 /// A factor on a capture's opacity, from 0 to 1, in addition to the opacity of its

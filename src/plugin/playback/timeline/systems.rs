@@ -5,6 +5,7 @@
 
 use super::asset::Timeline;
 use super::clip::Clip;
+use super::next::NextClip;
 use super::player::{ClipFade, PlayedClip, TimelinePlayer, TimelineTrack};
 use crate::plugin::asset::Uploads;
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
@@ -105,25 +106,30 @@ fn awaits(clip: &Clip, captures: &Assets<GaussianCapture>, uploads: &Uploads, se
     matches!(server.get_load_state(id), Some(LoadState::NotLoaded | LoadState::Loading))
 }
 
-/// Sets the clip, fade and visibility of every track's entity at the current time.
+/// What changes of the entity of a track besides its clip.
+type Tracked = (&'static TimelineTrack, &'static mut Visibility, &'static mut ClipFade, &'static mut NextClip);
+
+/// Sets the clip, fade and visibility of every track's entity at the current time, and what it plays next.
 pub(in crate::plugin::playback) fn update_tracks(
     timelines: Res<Assets<Timeline>>,
     captures: Res<Assets<GaussianCapture>>,
-    players: Query<(&TimelinePlayer, &PlaybackClock, &Children)>,
-    mut entities: Query<(&TimelineTrack, &mut Visibility, &mut ClipFade, Parts<'static>), Without<TimelinePlayer>>,
+    players: Query<(&TimelinePlayer, &PlaybackClock, &Playback, &Children)>,
+    mut entities: Query<(Tracked, Parts<'static>), Without<TimelinePlayer>>,
 ) {
     let _span = debug_span!("gs4d/tracks").entered();
-    for (handle, clock, children) in &players {
+    for (handle, clock, playback, children) in &players {
         let Some(timeline) = timelines.get(&handle.0) else { continue };
-        let time = clock.seconds;
+        let (time, duration) = (clock.seconds, timeline.duration_seconds());
         for &child in children {
-            let Ok((track, mut visibility, mut fade, parts)) = entities.get_mut(child) else { continue };
+            let Ok(((track, mut visibility, mut fade, mut next), parts)) = entities.get_mut(child) else { continue };
             // A reload may have removed the track.
-            let Some(clip) = timeline.track(&track.0).and_then(|track| track.clip_at(time)) else {
+            let track = timeline.track(&track.0);
+            next.set_if_neq(track.map(|track| NextClip::of(track, time, playback, duration)).unwrap_or_default());
+            let Some(clip) = track.and_then(|track| track.clip_at(time)) else {
                 visibility.set_if_neq(Visibility::Hidden);
                 continue;
             };
-            let visible = clip.shows(time, timeline.duration_seconds());
+            let visible = clip.shows(time, duration);
             visibility.set_if_neq(if visible { Visibility::Inherited } else { Visibility::Hidden });
             fade.set_if_neq(ClipFade(clip.fade_at(time)));
             set_clip(parts, clip, captures.get(&clip.capture));

@@ -1,7 +1,7 @@
 //! Chunk files on the GPU.
 //!
-//! In: chunk files that have been loaded, of which [`Uploads`] knows the capture. Out: their
-//! Gaussians in the pages of the buffers of that capture, until they are no longer loaded; what is known of all of them.
+//! In: chunk files that have been loaded, of which [`Uploads`] knows the capture. Out: their Gaussians in the pages of the
+//! buffers of that capture, until they are no longer loaded; what is known of all of them.
 
 use crate::plugin::asset::Uploads;
 use crate::plugin::component::GaussianCapture;
@@ -57,11 +57,12 @@ impl ChunkFile {
         to: &Destination<'_>,
         bytes: u64,
     ) -> Result<u64, GpuError> {
+        let UploadTarget { device, queue, renderer, uploads } = to.target;
         let progress = std::mem::replace(&mut self.progress, Progress::Complete);
         let mut upload = match progress {
             Progress::Waiting(source) => {
                 let scene = source.shared_scene();
-                files.remove(capture, self.number, to.uploads);
+                files.remove(capture, self.number, uploads);
                 if capture.paged_bytes().is_none() {
                     open(capture, &scene, to)?;
                 }
@@ -77,11 +78,11 @@ impl ChunkFile {
             Progress::Complete => return Ok(0),
         };
         let needed = bytes.min(upload.bytes_left(capture));
-        let advance = || upload.advance(to.queue, to.renderer, capture, bytes);
-        let written = catch_known(to.device, needed, advance).flatten()?;
+        let advance = || upload.advance(queue, renderer, capture, bytes);
+        let written = catch_known(device, needed, advance).flatten()?;
         self.bytes_left = upload.bytes_left(capture);
         if upload.is_complete(capture) {
-            files.complete(capture, self.number, to.uploads);
+            files.complete(capture, self.number, uploads);
         } else {
             self.progress = Progress::Uploading(upload);
         }
@@ -94,25 +95,32 @@ fn open(capture: &mut GpuCapture, first: &RuntimeScene, to: &Destination<'_>) ->
     let table = to.index.scene().chunks.as_ref().ok_or(GpuError::Scene("its index has no table of chunk files"))?;
     let index = (!to.index.is_released()).then(|| to.index.scene());
     let files = ChunkFiles { table, index, first };
-    capture.open_pages(to.device, to.queue, to.renderer, files, to.most_bytes)?;
-    let room = ViewRenderer::check_room(to.device, capture.most_paged().unwrap_or_default());
+    let UploadTarget { device, queue, renderer, .. } = to.target;
+    capture.open_pages(device, queue, renderer, files, to.most_bytes)?;
+    let room = ViewRenderer::check_room(device, capture.most_paged().unwrap_or_default());
     if room.is_err() {
         capture.close_pages();
     }
     room
 }
 
-/// Where files are uploaded to.
-pub(super) struct Destination<'a> {
+/// Where captures and chunk files are uploaded to.
+#[derive(Clone, Copy)]
+pub(super) struct UploadTarget<'a> {
     pub(super) device: &'a wgpu::Device,
     pub(super) queue: &'a wgpu::Queue,
     pub(super) renderer: &'a Renderer,
+    /// Is told which files are in pages.
+    pub(super) uploads: &'a Uploads,
+}
+
+/// The pages to which files of a capture are uploaded.
+pub(super) struct Destination<'a> {
+    pub(super) target: UploadTarget<'a>,
     /// The index of the capture.
     pub(super) index: &'a GaussianCapture,
     /// Bytes that its pages may take.
     pub(super) most_bytes: u64,
-    /// Is told which files are in pages.
-    pub(super) uploads: &'a Uploads,
 }
 
 /// The files in the pages of a capture.
@@ -205,7 +213,8 @@ impl PlacedFiles {
         if self.refused == Some(to.most_bytes) {
             return Ok(());
         }
-        let resized = capture.resize_pages(to.device, to.queue, to.renderer, to.most_bytes);
+        let UploadTarget { device, queue, renderer, .. } = to.target;
+        let resized = capture.resize_pages(device, queue, renderer, to.most_bytes);
         self.refused = resized.is_err().then_some(to.most_bytes);
         resized.map(|_| ())
     }

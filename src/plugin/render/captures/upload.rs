@@ -7,14 +7,14 @@
 //! capture of which it is a file.
 
 use super::budget::ThinnedCapture;
-use super::chunk_files::{ChunkFile, Destination, PlacedFiles};
+use super::chunk_files::{ChunkFile, Destination, PlacedFiles, UploadTarget};
 use crate::plugin::asset::{CaptureFailure, Uploads};
 use crate::plugin::component::GaussianCapture;
 use crate::plugin::render::logged::warn_once_each;
 use crate::plugin::render::renderer::CaptureRenderer;
 use crate::plugin::render::statistics::CaptureStatistics;
 use crate::renderer::device::memory::{Caught, catch, catch_known};
-use crate::renderer::{CaptureUpload, GpuCapture, GpuError, Renderer, Storage, ViewRenderer};
+use crate::renderer::{CaptureUpload, GpuCapture, GpuError, Storage, ViewRenderer};
 use crate::scene::{Bounds, Importances, Level, RuntimeScene};
 use crate::view::Optics;
 use bevy::asset::{AssetId, AssetServer, RenderAssetUsages};
@@ -106,24 +106,13 @@ impl ShownCapture {
     ) -> Option<T> {
         let Self { levels, importances, source, files } = self;
         let capture = levels.first_mut()?;
-        let UploadTarget { device, queue, renderer, uploads } = *to;
         let (before, index) = (capture.len(), &*source);
-        let changed = change(capture, files, &Destination { device, queue, renderer, index, most_bytes, uploads });
+        let changed = change(capture, files, &Destination { target: *to, index, most_bytes });
         if let Some(importances) = importances.first_mut().filter(|_| capture.len() != before) {
             *importances = files.importances();
         }
         Some(changed)
     }
-}
-
-/// Where captures are uploaded to.
-#[derive(Clone, Copy)]
-struct UploadTarget<'a> {
-    device: &'a wgpu::Device,
-    queue: &'a wgpu::Queue,
-    renderer: &'a Renderer,
-    /// Is told which files are in pages.
-    uploads: &'a Uploads,
 }
 
 /// A capture that is being uploaded.

@@ -4,7 +4,7 @@
 //! In: in each frame, its length, whether files are on their way, the bytes of those that have arrived; how many bytes
 //! playing needs. Out: the seconds by which each layer may come later.
 
-use crate::codec::stream::StreamLimits;
+use super::limits::StreamLimits;
 
 /// Bytes and seconds of before count half after so many seconds with files on their way.
 const HALF_LIFE: f64 = 3.0;
@@ -18,15 +18,16 @@ const SLOW_FROM: f64 = 1.5;
 
 /// The bytes of files that have arrived, and the seconds for which files were on their way, of the last few such seconds.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Throughput {
+pub struct Throughput {
     bytes: f64,
     seconds: f64,
     is_fast: bool,
 }
 
 impl Throughput {
-    /// Adds a frame, in which playing needs so many bytes per second.
-    pub(super) fn add(&mut self, seconds: f64, is_busy: bool, bytes: u64, needed: f64) {
+    /// Adds a frame: its length, whether files were on their way in it, the bytes of those that arrived, and how many bytes per
+    /// second playing needs ([`StreamSchedule::bytes_per_second`](super::StreamSchedule::bytes_per_second)).
+    pub fn add(&mut self, seconds: f64, is_busy: bool, bytes: u64, needed: f64) {
         if is_busy {
             let kept = (-seconds / HALF_LIFE).exp2();
             self.bytes = self.bytes * kept + bytes as f64;
@@ -39,8 +40,9 @@ impl Throughput {
         }
     }
 
-    /// Returns the seconds by which each layer may come later, of a capture that has memory for what is ahead.
-    pub(super) fn layer_seconds(self) -> f64 {
+    /// Returns [`StreamLimits::layer_seconds`] of a capture that has memory for what is ahead
+    /// ([`StreamSchedule::has_room`](super::StreamSchedule::has_room)).
+    pub fn layer_seconds(self) -> f64 {
         if self.is_fast { FAST } else { StreamLimits::LAYER_SECONDS }
     }
 }
