@@ -9,6 +9,7 @@ mod browser;
 mod people;
 mod server;
 mod shots;
+mod take;
 
 #[path = "../support"]
 mod support {
@@ -20,11 +21,12 @@ mod support {
 use bevy_gs4d::codec::package::{self, WriteSettings};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use serde_json::Value;
-use server::Results;
+use server::{Captures, Results};
 use shots::Shot;
 use std::path::PathBuf;
 use std::sync::OnceLock;
 use support::skip::skip;
+use take::Take;
 
 /// Gaussians of the large capture, which is in the trained form and takes 21 MB.
 const LARGE: usize = 40_000;
@@ -55,8 +57,10 @@ fn seen() -> Option<&'static Seen> {
     let seen = SEEN.get_or_init(|| {
         let folder = PathBuf::from(std::env::var_os("GS4D_WEB")?);
         let program = browser::program()?;
-        let shots = shots::all();
-        let results = server::serve(&folder, &shots, large(), |address| browser::open(&program, address));
+        let take = Take::new();
+        let shots = shots::all(&take);
+        let captures = Captures { large: large(), take };
+        let results = server::serve(&folder, &shots, captures, |address| browser::open(&program, address));
         Some(results.map(|results| Seen { results, shots }))
     });
     if seen.is_none() {
@@ -234,4 +238,14 @@ fn a_browser_without_webgpu_shows_a_message() {
 #[test]
 fn a_phone_has_all_controls_within_its_screen() {
     check_all("phone");
+}
+
+#[test]
+fn a_capture_in_chunk_files_plays_while_its_files_arrive() {
+    check_all("take");
+}
+
+#[test]
+fn chunk_files_that_fail_are_asked_for_again_and_a_missing_one_is_named() {
+    check_all("faults");
 }

@@ -57,7 +57,13 @@ async function pictures(design, shots) {
   const player = await open(`design=${design}&autoplay=0`);
   let opened = '/page/toybox.gs4d';
   for (const [index, shot] of shots.entries()) {
-    if (shot.file !== opened) {
+    if (shot.file.endsWith('index.gs4d')) {
+      if (shot.file !== opened) await player.page.openAddress(shot.file);
+      opened = shot.file;
+      // The time interval of the capture is 0 to 1.
+      player.page.seek(shot.time * player.page.about.seconds);
+      await until('all files of the time', () => player.page.thereShare === 1);
+    } else if (shot.file !== opened) {
       const bytes = new Uint8Array(await (await fetch(shot.file)).arrayBuffer());
       await player.page.openBytes(shot.name, bytes);
       opened = shot.file;
@@ -277,6 +283,79 @@ async function files(player) {
   await post('broken', broken);
 }
 
+// A capture in chunk files.
+async function take() {
+  const player = await open('capture=/slow/index.gs4d&autoplay=0');
+  const { page, had, at, inside, picture } = player;
+  const results = {};
+  results['its Gaussians are counted, and it has a length'] = page.about.gaussians === 4000 && page.about.seconds === 2;
+  const requests = () => inside.performance.getEntriesByType('resource').filter((one) => one.name.includes('/slow/chunk-')).length;
+  results['it is shown before all of its files are there'] = page.thereShare > 0 && page.thereShare < 1;
+  const coarse = await picture();
+  await fetch('/slow/finer');
+  await until('all files', () => page.thereShare === 1);
+  const first = await picture();
+  results['further layers make the picture finer'] = differ(coarse, first);
+  // The boundary of a stretch whose first layer is missing.
+  page.seek(1.5);
+  page.play();
+  await until('the time waits', () => had('buffering').length === 1);
+  await pause(200);
+  results['the time waits for its most important Gaussians, and says so'] = page.buffering && page.seconds === 1.5 && !at('loading').hidden;
+  results['the picture of before stays'] = !differ(first, await picture());
+  await fetch('/slow/last');
+  await until('the other time', () => had('buffered').length === 1);
+  await until('a loop', () => had('ended').length > 0);
+  results['it plays on in a loop'] = page.playing && page.seconds < 1.5;
+  results['nothing is waited for any more'] = had('buffering').length === 1 && at('loading').hidden;
+  page.play(false);
+  await until('all files', () => page.thereShare === 1);
+  const asked = requests();
+  page.seek(1.5);
+  results['another time is another picture'] = differ(first, await picture());
+  await pause(300);
+  results['files that are there are not fetched again'] = requests() === asked && page.thereShare === 1;
+  await page.openAddress('/page/toybox.gs4d');
+  results['another capture takes its place'] = page.about.gaussians === 45000 && page.thereShare === 1;
+  results['no message'] = at('message').hidden;
+  await post('take', results);
+  await player.close('take');
+}
+
+async function faults() {
+  const player = await open('capture=/flaky/index.gs4d&autoplay=0');
+  const { page, had, at, inside, picture } = player;
+  const results = {};
+  await until('all files', () => page.thereShare === 1);
+  results['requests that fail are made again'] = had('error').length === 0 && page.about.gaussians === 4000;
+  const shown = await picture();
+  page.openAddress('/lossy/index.gs4d');
+  await until('a message', () => had('error').length === 1);
+  results['a file that is missing is named'] = at('text').textContent.includes('chunk-00001-of-');
+  results['the capture of before stays'] = page.about.gaussians === 4000 && !differ(shown, await picture());
+  at('close').click();
+  page.openAddress('http://[');
+  await until('a message', () => had('error').length === 2);
+  results['an address that is none is refused'] = at('text').textContent.includes('is no address');
+  at('close').click();
+  const bytes = new Uint8Array(await (await fetch('/take/index.gs4d')).arrayBuffer());
+  await page.openBytes('index.gs4d', bytes);
+  await until('a message', () => had('error').length === 3);
+  results['an index alone is refused, and the remedy told'] = at('text').textContent.includes('gs4d join');
+  at('close').click();
+  const names = (await (await fetch('take.json')).json()).filter((name) => name !== 'index.gs4d');
+  const read = async (name) => new inside.File([await (await fetch(`/take/${name}`)).arrayBuffer()], name);
+  const dataTransfer = new inside.DataTransfer();
+  for (const name of [...names, 'index.gs4d']) dataTransfer.items.add(await read(name));
+  const before = had('loaded').length;
+  inside.document.body.dispatchEvent(new inside.DragEvent('drop', { dataTransfer, bubbles: true, cancelable: true }));
+  await until('the files of this device', () => had('loaded').length > before && page.thereShare === 1);
+  results['the files of a folder can be dropped together'] = had('error').length === 3;
+  inside.seen.console = inside.seen.console.filter((text) => !/503|404/.test(text));
+  await post('faults', results);
+  await player.close('faults');
+}
+
 async function missing() {
   const player = await open('test=missing');
   const results = {};
@@ -327,6 +406,8 @@ try {
   await limits();
   await seeking();
   await messages();
+  await take();
+  await faults();
   await missing();
   for (const design of ['sort', 'bins']) await pictures(design, shots);
   await bevy(shots);

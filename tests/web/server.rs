@@ -1,18 +1,24 @@
 //! The server of the pages.
 //!
-//! In: the folder of the built page, the pictures that are wanted, a large capture, a function that opens an address in
-//! a browser. Out: what the page has posted, by name, once it has posted `end`; a message if it fails.
+//! In: the folder of the built page, the pictures that are wanted, captures, a function that opens an address in a browser.
+//! Out: what the page has posted, by name, once it has posted `end`; a message if it fails.
+//!
+//! The chunk files are in four folders: `/take/`, where all is well; `/slow/`, whose files of layer 1 are answered once
+//! `/slow/finer` has been asked for, and that of the last stretch once `/slow/last` has; `/flaky/`, where the first request of each chunk file fails; `/lossy/`, which lacks the
+//! first chunk file.
 
 use crate::browser::Browser;
 use crate::shots::{Shot, listed};
-use std::collections::BTreeMap;
+use crate::take::Take;
+use bevy_gs4d::scene::ChunkTable;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::path::Path;
-use std::sync::Arc;
 use std::sync::mpsc::{Sender, channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// What a page has posted, by name.
 pub type Results = BTreeMap<String, Vec<u8>>;
@@ -23,11 +29,17 @@ const LIMIT: Duration = Duration::from_secs(240);
 /// Longest body that is accepted, bytes.
 const LONGEST: usize = 1 << 24;
 
+/// Captures that pages open.
+pub struct Captures {
+    pub large: Vec<u8>,
+    pub take: Take,
+}
+
 /// Serves the pages until they are done.
 pub fn serve(
     folder: &Path,
     shots: &[Shot],
-    large: Vec<u8>,
+    Captures { large, take }: Captures,
     open: impl FnOnce(&str) -> Browser,
 ) -> Result<Results, String> {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
@@ -39,17 +51,33 @@ pub fn serve(
     files.insert("/test/hooks.js".into(), include_bytes!("hooks.js").to_vec());
     files.insert("/test/shots.json".into(), listed(shots).into_bytes());
     files.insert("/large.gs4d".into(), large);
+    let names: Vec<&str> = take.files.keys().map(String::as_str).collect();
+    files.insert("/test/take.json".into(), serde_json::Value::from(names).to_string().into_bytes());
     for shot in shots {
         if let Some(package) = &shot.package {
             files.insert(shot.file.clone(), package.clone());
         }
     }
+    let of = take.files.len() - 1;
+    for (name, bytes) in &take.files {
+        for folder in ["take", "slow", "flaky", "lossy"] {
+            if (folder, name) != ("lossy", &ChunkTable::file_name(0, of)) {
+                files.insert(format!("/{folder}/{name}"), bytes.clone());
+            }
+        }
+    }
+    let mut late = BTreeMap::new();
+    for (until, names) in [("/slow/finer", &take.finer), ("/slow/last", &take.last)] {
+        files.insert(until.into(), Vec::new());
+        late.extend(names.iter().map(|name| (format!("/slow/{name}"), until)));
+    }
     let (files, folder) = (Arc::new(files), folder.to_owned());
+    let faults = Arc::new(Faults { late, asked: Mutex::default() });
     // The thread ends with the process of the tests.
     thread::spawn(move || {
         for stream in listener.incoming().flatten() {
-            let (files, folder, to) = (files.clone(), folder.clone(), to.clone());
-            thread::spawn(move || answer(stream, &files, &folder, &to));
+            let (files, folder, faults, to) = (files.clone(), folder.clone(), faults.clone(), to.clone());
+            thread::spawn(move || answer(stream, &files, &folder, &faults, &to));
         }
     });
     let browser = open(&address);
@@ -70,11 +98,39 @@ pub fn serve(
     }
 }
 
+/// What is wrong with the server, for some paths.
+struct Faults {
+    /// Paths that wait until others have been asked for.
+    late: BTreeMap<String, &'static str>,
+    /// Paths that have been asked for.
+    asked: Mutex<BTreeSet<String>>,
+}
+
+impl Faults {
+    fn asked(&self) -> MutexGuard<'_, BTreeSet<String>> {
+        self.asked.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Notes a request. Returns whether it is the first of its path.
+    fn ask(&self, path: &str) -> bool {
+        self.asked().insert(path.to_owned())
+    }
+
+    /// Waits until a path may be answered.
+    fn wait_for(&self, path: &str) {
+        let (began, until) = (Instant::now(), self.late.get(path));
+        while until.is_some_and(|until| !self.asked().contains(*until)) && began.elapsed() < LIMIT {
+            thread::sleep(Duration::from_millis(10));
+        }
+    }
+}
+
 /// Answers one request. A browser that ends a connection early is no fault.
 fn answer(
     stream: TcpStream,
     files: &BTreeMap<String, Vec<u8>>,
     folder: &Path,
+    faults: &Faults,
     to: &Sender<(String, Vec<u8>)>,
 ) -> Option<()> {
     let mut reader = BufReader::new(stream);
@@ -101,6 +157,10 @@ fn answer(
         to.send((path.trim_start_matches("/result/").to_owned(), body)).ok()?;
         return write(reader.get_mut(), "204 No Content", "text/plain", b"");
     }
+    if faults.ask(&path) && path.starts_with("/flaky/chunk-") {
+        return write(reader.get_mut(), "503 Service Unavailable", "text/plain", b"");
+    }
+    faults.wait_for(&path);
     let file = files.get(&path).cloned().or_else(|| {
         let name = path.strip_prefix("/page/").filter(|name| !name.contains(".."))?;
         std::fs::read(folder.join(if name.is_empty() { "index.html" } else { name })).ok()

@@ -1,9 +1,10 @@
 //! The pictures that a browser is asked for.
 //!
-//! In: the golden scenes and the bundled capture. Out: [`Shot`]s, each with the file of its capture, a camera in the
+//! In: the golden scenes, a capture in chunk files and the bundled capture. Out: [`Shot`]s, each with the file of its capture, a camera in the
 //! numbers of the page, and the picture of the CPU reference.
 
 use crate::support::golden::all_views;
+use crate::take::Take;
 use bevy_gs4d::codec::package::{self, WriteSettings};
 use bevy_gs4d::reference;
 use bevy_gs4d::scene::{Bounds, GaussianScene, RuntimeScene};
@@ -27,7 +28,7 @@ pub struct Shot {
 }
 
 /// Returns all pictures.
-pub fn all() -> Vec<Shot> {
+pub fn all(take: &Take) -> Vec<Shot> {
     let goldens = all_views().into_iter().map(|golden| {
         let mut scene = golden.scene;
         // The field of view belongs to the capture in a package.
@@ -52,7 +53,12 @@ pub fn all() -> Vec<Shot> {
         let shot = shot(format!("toybox at {time}"), "/page/toybox.gs4d".into(), None, &toybox, view);
         Shot { of_app, ..shot }
     });
-    goldens.chain(bundled).collect()
+    let in_files = [0.1, 0.6, 0.95].map(|time| {
+        let camera = Camera::look_at(Vec3::new(2.0, -1.5, 1.2), Vec3::ZERO, Vec3::Z, 0.9, UVec2::new(320, 180));
+        let view = camera.view(time, take.scene.trained_with.raster_fov);
+        shot(format!("chunk files at {time}"), "/take/index.gs4d".into(), None, &take.scene, view)
+    });
+    goldens.chain(in_files).chain(bundled).collect()
 }
 
 fn shot(name: String, file: String, package: Option<Vec<u8>>, scene: &RuntimeScene, view: View) -> Shot {

@@ -1,6 +1,8 @@
 // Files of captures: from an address or this device into the player.
-// In: an address, a file, bytes. Out: what there is to tell about the capture once it is shown, and about its beginning before that; progress; a
-// sentence that says what was wrong and what to do.
+// In: an address, a file, bytes. Out: what there is to tell about the capture once it is shown, and about its beginning before that; the stream of a
+// capture in chunk files; progress; a sentence that says what was wrong and what to do.
+
+import { Stream } from './stream.js';
 
 // Milliseconds of a slice of loading: the page draws and answers between slices.
 const SLICE = 8;
@@ -76,7 +78,7 @@ function misnomer(bytes) {
 export class Opener {
   // `report` gets the progress; `times.longestSlice` is kept.
   constructor(player, times, report) {
-    Object.assign(this, { player, times, report, own: null });
+    Object.assign(this, { player, times, report, own: null, stream: null });
   }
 
   // Ends what is being opened.
@@ -85,10 +87,18 @@ export class Opener {
     this.end();
   }
 
-  // Frees the memory of what is being opened.
+  // Frees the memory of what is being opened, and ends its requests.
   end() {
     this.own = null;
+    this.take()?.end();
     this.player.close?.();
+  }
+
+  // Returns the stream of the capture that has been opened, if it is in chunk files; from now on it is the caller's.
+  take() {
+    const stream = this.stream;
+    this.stream = null;
+    return stream;
   }
 
   get busy() {
@@ -103,20 +113,23 @@ export class Opener {
     return result;
   }
 
-  // Opens the file whose stream and length a promise gives. `preview` gets what there is to tell about each beginning of the file that is shown. Returns
-  // what there is to tell about the file; null if it was cancelled or replaced.
-  async open(name, begin, preview) {
+  // Opens the file whose stream and length a promise gives. `preview` gets what there is to tell about each beginning of the file that is shown;
+  // `beside` gives files beside it, if there are any, and `seconds` is the time of its first picture. `shown` gets what there is to tell about the file
+  // once it is shown. Returns whether it is, and was not cancelled or replaced.
+  async open(name, begin, { preview, beside, seconds, shown }) {
     this.cancel();
     const own = new AbortController();
     this.own = own;
     try {
       this.report({ name, part: 0, bytes: 0, total: 0, state: 'receiving' });
       const { stream, length } = await begin(own.signal);
-      if (own.signal.aborted) return null;
+      if (own.signal.aborted) return false;
       await this.receive(name, stream, length, own.signal, preview);
-      return own.signal.aborted ? null : await this.read(name, own.signal);
+      const found = own.signal.aborted ? null : await this.read(name, own.signal, beside, seconds);
+      if (found) shown(found);
+      return Boolean(found);
     } catch (error) {
-      if (own.signal.aborted) return null;
+      if (own.signal.aborted) return false;
       throw error instanceof Refusal ? error : new Refusal(`${name} was not opened: ${typeof error === 'string' ? error : (error?.message ?? error)}`);
     } finally {
       if (this.own === own) this.end();
@@ -159,8 +172,25 @@ export class Opener {
     if (received < length) throw cut();
   }
 
-  read(name, signal) {
-    return this.steps(() => this.player.step(), signal, () => this.report({ name, part: 0.7 + 0.29 * this.player.progress(), state: 'reading' }));
+  read(name, signal, beside, seconds) {
+    const between = () => {
+      this.report({ name, part: 0.7 + 0.29 * this.player.progress(), state: 'reading' });
+      this.follow(name, beside, seconds);
+    };
+    return this.steps(() => this.player.step(), signal, between);
+  }
+
+  // Fetches files of the first picture of a capture in chunk files.
+  follow(name, beside, seconds) {
+    const number = this.player.opening_stream?.();
+    if (number === undefined) return;
+    if (!beside) {
+      throw new Refusal(`${name} is the index of a capture in chunk files, which are beside it: drop all of them, open its address, or join them by gs4d join.`);
+    }
+    this.stream ??= new Stream(this.player, number, beside);
+    this.stream.follow(seconds, 1, true);
+    const obstacle = this.stream.obstacle(seconds);
+    if (obstacle) throw new Refusal(`${name} was not opened: ${obstacle}.`, true);
   }
 
   // Does steps until one has a result, and returns it; null if that was cancelled. `between` is called after each slice.
@@ -174,7 +204,7 @@ export class Opener {
       });
       if (found) return found;
       between();
-      await (this.player.waits() ? new Promise((resolve) => setTimeout(resolve, 1)) : pause());
+      await (this.player.waits() ? new Promise((resolve) => setTimeout(resolve, this.stream ? 15 : 1)) : pause());
       if (signal.aborted) return null;
     }
   }

@@ -39,10 +39,10 @@ export function loading(report) {
   if (!report) return;
   const { name = '', part = 0, bytes = 0, total = 0, state } = report;
   const share = total ? `${Math.round((100 * bytes) / total)} %, ${megabytes(bytes)} of ${megabytes(total)}` : bytes ? megabytes(bytes) : '';
-  const words = { starting: 'Starting the player', receiving: `${name} ${share}`.trim(), reading: `Reading ${name}`, compiling: 'Preparing the first picture' };
+  const words = { starting: 'Starting the player', receiving: `${name} ${share}`.trim(), reading: `Reading ${name}`, compiling: 'Preparing the first picture', buffering: 'Loading this time' };
   at('loading-text').textContent = words[state] ?? '';
   at('progress').value = part;
-  at('cancel').hidden = state === 'starting' || state === 'compiling';
+  at('cancel').hidden = ['starting', 'compiling', 'buffering'].includes(state);
 }
 
 // Makes a toolbar one stop of the tab key: arrow keys move inside it.

@@ -4,6 +4,7 @@
 import { Orbit } from './camera.js';
 import { Opener, Refusal, nameOf, request } from './files.js';
 import { at, dismiss, help, loading, refuse, say, toolbar } from './parts.js';
+import { among, beside } from './stream.js';
 import { Quality } from './quality.js';
 import { framed, linkTo, listenAround, obedient, tell } from './around.js';
 
@@ -27,6 +28,9 @@ let player = null;
 let opener = null;
 let orbit = null;
 let about = null;
+// The files of a capture in chunk files, and whether time waits for some.
+let stream = null;
+let buffering = false;
 // The address of the capture that is shown, if the query does not name it; null for a file of this device.
 let source;
 let name = '';
@@ -115,7 +119,7 @@ function showTime() {
 
 // Lets the time of the capture pass: it stands until there is a picture of it.
 function advance(passed) {
-  if (!playing || pictured !== true) return;
+  if (!playing || pictured !== true || buffering) return;
   seconds += passed * speed();
   if (seconds >= duration()) {
     seconds = loops ? seconds % duration() : duration();
@@ -128,6 +132,36 @@ function advance(passed) {
     told = before;
     tell('time', { seconds });
   }
+}
+
+// Shows what the picture waits for, unless a file is being opened, whose progress is shown.
+function notice() {
+  if (!opener.busy) loading(buffering ? { state: 'buffering', part: 1 } : null);
+}
+
+// Fetches the files of a capture in chunk files. Until the most important Gaussians of a time are there, the picture of before stays.
+function follow() {
+  if (!stream) return;
+  stream.follow(seconds, playing ? speed() : 0, loops);
+  try {
+    if (stream.work()) changed = true;
+  } catch (error) {
+    stream.end();
+    stream = null;
+    if (buffering) tell('buffered', { seconds });
+    buffering = false;
+    play(false);
+    return fail(`${name} is not played any further: ${message(error)}`, { closable: true });
+  }
+  const waits = !stream.has(seconds);
+  if (waits !== buffering) {
+    buffering = waits;
+    changed = true;
+    notice();
+    tell(waits ? 'buffering' : 'buffered', { seconds });
+  }
+  const obstacle = waits ? stream.obstacle(seconds) : null;
+  if (obstacle) fail(`${name}, at ${seconds.toFixed(1)} s: ${obstacle}.`, { closable: true });
 }
 
 const FLIGHTS = { d: [0, 1], a: [0, -1], q: [1, 1], e: [1, -1], w: [2, 1], s: [2, -1] };
@@ -148,6 +182,7 @@ function frame(now) {
     changed = true;
     moved = now;
   }
+  follow();
   advance(passed);
   const fault = player.fault();
   if (fault) {
@@ -171,8 +206,7 @@ function finish(now) {
   if (pictured !== 'drawn') return;
   pictured = true;
   at('poster').classList.add('gone');
-  // What is being received is still told.
-  if (!opener.busy) loading(null);
+  notice();
   stage.classList.remove('loading');
   // Windows of Bevy take the focus.
   if (!player.resize) canvas.blur();
@@ -225,25 +259,26 @@ function report(progress) {
 // What is shown of whose file only the beginning has been received: its title, its address, and what opens it again.
 let partial = null;
 
-// Opens a file. Returns whether it is shown; what was shown, perhaps its beginning, stays if it is not.
-async function open(title, begin, again, address) {
+// Opens a file; `near` gives files beside it, if there are any. Returns whether it is shown; what was shown, perhaps its beginning, stays if it is not.
+async function open(title, begin, again, address, near = null) {
   if (!player) return fail(WITHOUT), false;
   dismiss();
   // Whether the beginning of the file is shown.
   let begun = Boolean(again) && partial?.title === title && partial.address === address;
   const take = (found) => (begun ? renew(found) : show(found, title, address));
   try {
-    const found = await opener.open(title, begin, (beginning) => {
+    const preview = (beginning) => {
       take(beginning);
       [begun, partial] = [true, { title, address, again }];
       tell('preview', { gaussians: about.gaussians });
-    });
-    if (!found) return false;
-    take(found);
-    partial = null;
-    loading(pictured === true ? null : { state: 'compiling', part: 1 });
-    tell('loaded', { seconds: duration(), gaussians: about.gaussians });
-    return true;
+    };
+    const shown = (found) => {
+      take(found);
+      partial = null;
+      loading(pictured === true ? null : { state: 'compiling', part: 1 });
+      tell('loaded', { seconds: duration(), gaussians: about.gaussians });
+    };
+    return await opener.open(title, begin, { preview, shown, beside: near, seconds: address === undefined ? timeOfLink() ?? 0 : 0 });
   } catch (error) {
     const action = error instanceof Refusal && error.again ? again : null;
     fail(message(error), { again: action ? 'Try again' : '', action, closable: Boolean(about) || !action });
@@ -254,13 +289,21 @@ async function open(title, begin, again, address) {
 const openBytes = (title, bytes) => open(title, async () => ({ stream: new Blob([bytes]).stream(), length: bytes.length }), null, null);
 
 const openAddress = (address, isOfQuery = false) =>
-  open(nameOf(address), (signal) => request(address, signal), () => openAddress(address, isOfQuery), isOfQuery ? undefined : address);
+  open(nameOf(address), (signal) => request(address, signal), () => openAddress(address, isOfQuery), isOfQuery ? undefined : address, beside(address));
 
-const openFile = (file) => file && open(file.name, async () => ({ stream: file.stream(), length: file.size }), null, null);
+const openFile = (file, near = null) => file && open(file.name, async () => ({ stream: file.stream(), length: file.size }), null, null, near);
+
+// Of several files, one is the index of the others.
+function openFiles(list) {
+  const files = [...list];
+  if (files.length < 2) return openFile(files[0]);
+  return openFile(files.find((file) => file.name === 'index.gs4d') ?? files[0], among(files));
+}
 
 function cancel() {
   opener?.cancel();
-  loading(null);
+  if (about) notice();
+  else loading(null);
   const again = about ? partial?.again : () => first();
   if (again) fail('Loading was cancelled.', { again: 'Load again', action: again, closable: Boolean(about) });
   else say('Loading was cancelled');
@@ -270,6 +313,8 @@ function cancel() {
 function note(found) {
   about = { gaussians: found.gaussians, seconds: found.seconds, interval: [...found.interval], center: found.center, radius: found.radius, up: found.up };
   found.free?.();
+  stream?.end();
+  [stream, buffering] = [opener.take(), false];
   [changed, learns] = [true, false];
   // A picture that is on its way is of another capture.
   if (drawn) drawn.learns = false;
@@ -291,7 +336,7 @@ function show(found, title, address) {
   showTime();
   // A link with a time shows that moment.
   if (wanted && !(source === undefined && query.has('time'))) play();
-  if (source === undefined) follow();
+  if (source === undefined) goToLink();
 }
 
 // Shows more of the capture that is shown: camera, time and playback stay.
@@ -408,7 +453,7 @@ function listenControls() {
   at('home').onclick = () => act('Home');
   at('open').onclick = () => at('file').click();
   at('file').onchange = () => {
-    openFile(at('file').files[0]);
+    openFiles(at('file').files);
     at('file').value = '';
   };
   at('link').onclick = copyLink;
@@ -439,7 +484,7 @@ function listenDrops() {
   addEventListener('drop', (event) => {
     event.preventDefault();
     at('drop').hidden = true;
-    openFile(event.dataTransfer.files[0]);
+    openFiles(event.dataTransfer.files);
   });
 }
 
@@ -548,11 +593,16 @@ async function begin() {
 // Opens the capture of the query, at its view.
 const first = () => openAddress(query.get('capture') ?? 'toybox.gs4d', true);
 
-// Goes to the camera and the time of the query.
-function follow() {
-  if (query.has('camera') && !orbit.read(query.get('camera'))) say('The camera of the link is not understood');
+// The time of the query; null if it has none.
+function timeOfLink() {
   const time = Number(query.get('time') || 'none');
-  if (Number.isFinite(time)) seek(time);
+  return Number.isFinite(time) ? time : null;
+}
+
+// Goes to the camera and the time of the query.
+function goToLink() {
+  if (query.has('camera') && !orbit.read(query.get('camera'))) say('The camera of the link is not understood');
+  if (timeOfLink() !== null) seek(timeOfLink());
   else if (query.has('time')) say('The time of the link is not understood');
 }
 
@@ -568,6 +618,8 @@ window.gs4d = {
   get quality() { return quality; },
   get share() { return drawn?.share ?? 0; },
   get gaussians() { return drawn?.gaussians ?? 0; },
+  get buffering() { return buffering; },
+  get thereShare() { return stream ? player.share_there(stream.number, seconds) : 1; },
 };
 
 begin();

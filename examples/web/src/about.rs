@@ -40,4 +40,12 @@ impl About {
             up: scene.playback.up.vector().to_array().to_vec(),
         }
     }
+
+    /// Describes a capture in chunk files: the number of its Gaussians, and where the first of these are.
+    pub fn place(&mut self, gaussians: u64, core: Option<Bounds>) {
+        self.gaussians = u32::try_from(gaussians).unwrap_or(u32::MAX);
+        if let Some(core) = core {
+            (self.center, self.radius) = (core.center().to_array().to_vec(), core.radius());
+        }
+    }
 }

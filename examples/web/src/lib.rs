@@ -11,5 +11,5 @@ mod pose;
 
 pub use about::About;
 pub use faults::{Faults, report_panics};
-pub use opening::{Opening, Step};
+pub use opening::{Opening, OpeningStep};
 pub use pose::view;

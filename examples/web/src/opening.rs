@@ -40,7 +40,7 @@ enum Layers {
 }
 
 /// What a step has done.
-pub enum Step {
+pub enum OpeningStep {
     /// A part of the work.
     Part,
     /// All of it.
@@ -92,21 +92,21 @@ impl Opening {
     ///
     /// # Errors
     /// A message about a file of an unknown format, or a damaged one.
-    pub fn advance(&mut self) -> Result<Step, String> {
+    pub fn advance(&mut self) -> Result<OpeningStep, String> {
         // The page names the file.
         let message = |error: CodecError| error.kind.to_string();
         match std::mem::replace(&mut self.state, State::Empty) {
             State::Receiving(Receiving { name, bytes, .. }) => {
                 let loading = Loading::new(&name, bytes, &ReadOptions::default());
                 self.state = State::Reading(Box::new(loading.map_err(message)?));
-                Ok(Step::Part)
+                Ok(OpeningStep::Part)
             }
             State::Reading(mut loading) => {
                 if !loading.advance(Loading::STEP).map_err(message)? {
-                    return Ok(Step::Scene(Box::new(loading.finish().map_err(message)?)));
+                    return Ok(OpeningStep::Scene(Box::new(loading.finish().map_err(message)?)));
                 }
                 self.state = State::Reading(loading);
-                Ok(Step::Part)
+                Ok(OpeningStep::Part)
             }
             State::Empty => Err("the file has been opened".to_owned()),
         }

@@ -2,7 +2,8 @@
 //!
 //! In: a canvas, then a file, then cameras and times. Out: pictures on the canvas, of the beginning of a file before all
 //! of it has been received. The page calls [`Player`] from JavaScript (`page/player.js`); nothing here waits: a file is
-//! opened in steps, and the page asks whether the device has finished the last picture.
+//! opened in steps, and the page asks whether the device has finished the last picture. Of an index of chunk files, the
+//! page fetches those that a [`Plan`] names.
 
 use bevy_gs4d::renderer::{
     ActiveList, CaptureUpload, Design, GpuCapture, GpuContext, Instance, Renderer, ShaderChecks, ViewParameters,
@@ -11,7 +12,7 @@ use bevy_gs4d::renderer::{
 use bevy_gs4d::scene::{Importances, RuntimeScene};
 use bevy_gs4d::view::{Appearance, Background, Optics, Thinning, View};
 use glam::{Mat4, UVec2};
-use gs4d_web::{About, Faults, Opening, Step, report_panics, view};
+use gs4d_web::{About, Faults, Opening, OpeningStep, report_panics, view};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -19,8 +20,11 @@ use web_sys::HtmlCanvasElement;
 
 #[path = "player/present.rs"]
 mod present;
+#[path = "player/streamed.rs"]
+mod streamed;
 
 use present::Present;
+use streamed::{Stepped, Streamed, Target};
 
 /// Bytes that a step uploads.
 const UPLOAD: u64 = 1 << 18;
@@ -53,6 +57,31 @@ pub struct Player {
     /// Whether the device has finished the last picture, and whether it has taken what was uploaded.
     finished: Arc<AtomicBool>,
     taken: Arc<AtomicBool>,
+    /// Bytes that were uploaded since the device had taken all.
+    untaken: u64,
+    /// The number of captures in chunk files that were opened.
+    streams: u32,
+}
+
+/// What a page does next for a capture in chunk files.
+#[wasm_bindgen(getter_with_clone)]
+pub struct Plan {
+    /// Numbers of the files to fetch, the most urgent first.
+    pub fetch: Vec<u32>,
+    /// Numbers of the files to fetch no further.
+    pub give_up: Vec<u32>,
+}
+
+/// What a step with the files of a capture has done.
+#[wasm_bindgen]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Step {
+    /// There is nothing to do.
+    Nothing,
+    /// A part of the work.
+    Part,
+    /// The picture may be another one now.
+    File,
 }
 
 /// A file, or the beginning of one, that is being opened.
@@ -60,8 +89,8 @@ enum Loader {
     Reading(Opening),
     /// With the share of the Gaussians of the file that the scene has.
     Read(Box<RuntimeScene>, f32),
-    /// With the bytes that were uploaded since the device had taken all.
-    Uploading(Box<CaptureUpload<RuntimeScene>>, Kept, u64),
+    Uploading(Box<CaptureUpload<RuntimeScene>>, Kept, Option<Box<Streamed>>),
+    /// The first picture of a capture in chunk files needs the first of these.
     Uploaded(Box<Shown>),
 }
 
@@ -80,13 +109,18 @@ struct Shown {
     capture: GpuCapture,
     active: Option<ActiveList>,
     kept: Kept,
+    /// Its files, if it is in chunk files.
+    stream: Option<Box<Streamed>>,
 }
 
 impl Shown {
     /// Returns the capture in a view, thinned to the most important share of its Gaussians. Those of the beginning of a
     /// file also fill the gaps of the Gaussians that are missing.
     fn instance(&self, view: View, share: f32) -> Instance<'_> {
-        let Kept { importances, of, .. } = &self.kept;
+        let Kept { of, .. } = &self.kept;
+        // Those of files come and go.
+        let of_files = self.stream.as_ref().filter(|_| share < 1.0).map(|stream| stream.importances());
+        let importances = of_files.as_ref().unwrap_or(&self.kept.importances);
         let least = importances.least_of(share);
         let thinning = if *of < 1.0 {
             let least = least.max(FAINTEST);
@@ -96,6 +130,23 @@ impl Shown {
         };
         let appearance = Appearance { thinning, ..Appearance::default() };
         Instance { capture: &self.capture, active: self.active.as_ref(), view, appearance }
+    }
+
+    /// Returns whether the files of its first picture are missing.
+    fn lacks_picture(&self) -> bool {
+        self.stream.as_ref().is_some_and(|stream| !stream.has_first_picture())
+    }
+
+    /// Returns whether no file has been received that is not drawn.
+    fn is_idle(&self) -> bool {
+        self.stream.as_ref().is_none_or(|stream| stream.is_idle())
+    }
+
+    /// Notes where the Gaussians of the first files are.
+    fn note_place(&mut self) {
+        if let Some(stream) = &mut self.stream {
+            self.kept.about.place(stream.gaussians(), stream.take_core());
+        }
     }
 
     fn parameters(&self, background: Option<[f32; 3]>) -> ViewParameters<'static> {
@@ -114,8 +165,8 @@ impl Player {
         let GpuContext { device, queue, .. } = &self.context;
         let next = match file {
             Loader::Reading(mut opening) => match opening.advance()? {
-                Step::Part => Loader::Reading(opening),
-                Step::Scene(scene) => Loader::Read(scene, opening.share()),
+                OpeningStep::Part => Loader::Reading(opening),
+                OpeningStep::Scene(scene) => Loader::Read(scene, opening.share()),
             },
             Loader::Read(scene, of) => {
                 let kept = Kept {
@@ -125,29 +176,30 @@ impl Player {
                     importances: Importances::of(&scene),
                     of,
                 };
+                let stream = Streamed::new(self.streams, &scene).map(Box::new);
+                self.streams += u32::from(stream.is_some());
                 let upload = CaptureUpload::new(device, &self.renderer, *scene).map_err(|e| e.to_string())?;
                 ViewRenderer::check_room(device, upload.most_drawn()).map_err(|e| e.to_string())?;
-                Loader::Uploading(Box::new(upload), kept, 0)
+                Loader::Uploading(Box::new(upload), kept, stream)
             }
             uploading @ Loader::Uploading(..) if self.waits() => uploading,
-            Loader::Uploading(mut upload, kept, before) => {
+            Loader::Uploading(mut upload, kept, stream) => {
                 let uploaded = upload.advance(queue, &self.renderer, UPLOAD);
                 if uploaded > 0 {
-                    let mut all = before + uploaded;
-                    if all >= UPLOADED_AT_ONCE {
-                        all = 0;
-                        self.taken.store(false, Ordering::Relaxed);
-                        let taken = self.taken.clone();
-                        queue.on_submitted_work_done(move || taken.store(true, Ordering::Relaxed));
-                    }
-                    Loader::Uploading(upload, kept, all)
+                    self.note_uploaded(uploaded);
+                    Loader::Uploading(upload, kept, stream)
                 } else {
                     let capture = upload.finish(queue, &self.renderer);
                     let active = ActiveList::new(device, &self.renderer, &capture);
-                    Loader::Uploaded(Box::new(Shown { capture, active, kept }))
+                    Loader::Uploaded(Box::new(Shown { capture, active, kept, stream }))
                 }
             }
-            Loader::Uploaded(shown) => {
+            Loader::Uploaded(mut shown) if shown.lacks_picture() => {
+                self.step_file(&mut shown)?;
+                Loader::Uploaded(shown)
+            }
+            Loader::Uploaded(mut shown) => {
+                shown.note_place();
                 // The passes are compiled here, so that the first picture does not take long.
                 let size = UVec2::new(self.configuration.width, self.configuration.height);
                 let view = view(&Mat4::IDENTITY.to_cols_array(), &[0.5, 0.5], size, 0.0, shown.kept.optics)?;
@@ -165,6 +217,54 @@ impl Player {
             }
         };
         Ok((Some(next), None))
+    }
+
+    /// Counts bytes that were uploaded, of which the device has to take some before there are more.
+    fn note_uploaded(&mut self, bytes: u64) {
+        self.untaken += bytes;
+        if self.untaken >= UPLOADED_AT_ONCE {
+            self.untaken = 0;
+            self.taken.store(false, Ordering::Relaxed);
+            let taken = self.taken.clone();
+            self.context.queue.on_submitted_work_done(move || taken.store(true, Ordering::Relaxed));
+        }
+    }
+
+    /// Does one step with the files of a capture that have been received.
+    fn step_file(&mut self, shown: &mut Shown) -> Result<Step, String> {
+        let Some(stream) = &mut shown.stream else { return Ok(Step::Nothing) };
+        if self.waits_for_device() {
+            return Ok(Step::Nothing);
+        }
+        let GpuContext { device, queue, .. } = &self.context;
+        let to = Target { device, queue, renderer: &self.renderer, bytes: UPLOAD };
+        Ok(match stream.step(&mut shown.capture, &mut shown.active, to)? {
+            Stepped::Nothing => Step::Nothing,
+            Stepped::Part(uploaded) => {
+                self.note_uploaded(uploaded);
+                Step::Part
+            }
+            Stepped::File(uploaded) => {
+                self.note_uploaded(uploaded);
+                Step::File
+            }
+        })
+    }
+
+    fn waits_for_device(&self) -> bool {
+        !self.taken.load(Ordering::Relaxed)
+    }
+
+    /// Returns the capture in chunk files of this number that is opened or shown, and its files.
+    fn streamed(&mut self, stream: u32) -> Option<(&mut GpuCapture, &mut Streamed)> {
+        let opening = match &mut self.opening {
+            Some(Loader::Uploaded(shown)) => Some(&mut **shown),
+            _ => None,
+        };
+        let mut all = opening.into_iter().chain(&mut self.shown);
+        all.find_map(|Shown { capture, stream: own, .. }| {
+            own.as_deref_mut().filter(|own| own.id == stream).map(|own| (capture, own))
+        })
     }
 }
 
@@ -221,6 +321,8 @@ impl Player {
             share: 1.0,
             finished,
             taken,
+            untaken: 0,
+            streams: 0,
         })
     }
 
@@ -310,9 +412,75 @@ impl Player {
         Ok(about)
     }
 
-    /// Returns whether a step does nothing yet: the device has to take what was uploaded.
+    /// Returns whether a step does nothing yet: the device has to take what was uploaded, or a capture in chunk files
+    /// needs one that has not been received.
     pub fn waits(&self) -> bool {
-        !self.taken.load(Ordering::Relaxed)
+        let lacks_file = match &self.opening {
+            Some(Loader::Uploaded(shown)) => shown.lacks_picture() && shown.is_idle(),
+            _ => false,
+        };
+        self.waits_for_device() || lacks_file
+    }
+
+    /// Returns the number of the capture that is being opened, once it is known to be in chunk files.
+    pub fn opening_stream(&self) -> Option<u32> {
+        let Some(Loader::Uploaded(shown)) = &self.opening else { return None };
+        shown.stream.as_ref().map(|stream| stream.id)
+    }
+
+    /// Decides which files of a capture come next. `now` is a clock in seconds, `seconds` the time that is played, at
+    /// `velocity` times its speed: 0 while it is paused. `None` if the capture is neither opened nor shown any more.
+    pub fn plan(&mut self, stream: u32, now: f64, seconds: f64, velocity: f64, loops: bool) -> Option<Plan> {
+        let (capture, own) = self.streamed(stream)?;
+        let plan = own.plan(capture, now, seconds, velocity, loops);
+        let [fetch, give_up] =
+            [plan.fetch, plan.give_up].map(|files| files.into_iter().map(|file| file as u32).collect());
+        Some(Plan { fetch, give_up })
+    }
+
+    /// Returns the name of a file of a capture, which is beside its index.
+    pub fn file_name(&mut self, stream: u32, file: u32) -> Option<String> {
+        self.streamed(stream).map(|(_, own)| own.file_name(file as usize))
+    }
+
+    /// Receives a file of a capture.
+    pub fn receive_file(&mut self, stream: u32, file: u32, bytes: Vec<u8>) {
+        if let Some((capture, own)) = self.streamed(stream) {
+            own.receive(capture, file as usize, bytes);
+        }
+    }
+
+    /// Notes that a file of a capture could not be fetched.
+    pub fn fail_file(&mut self, stream: u32, file: u32) {
+        if let Some((capture, own)) = self.streamed(stream) {
+            own.fail(capture, file as usize);
+        }
+    }
+
+    /// Does one step with the files that have been received of the capture that is shown.
+    ///
+    /// # Errors
+    /// A message about a file that is not of the capture.
+    pub fn step_files(&mut self) -> Result<Step, String> {
+        let Some(mut shown) = self.shown.take() else { return Ok(Step::Nothing) };
+        let stepped = self.step_file(&mut shown);
+        self.shown = Some(shown);
+        stepped
+    }
+
+    /// Returns whether the most important Gaussians of a time are there, seconds since the start of a capture.
+    pub fn has_picture(&mut self, stream: u32, seconds: f64) -> bool {
+        self.streamed(stream).is_some_and(|(_, own)| own.has_picture(seconds))
+    }
+
+    /// Returns the share of the Gaussians of a time that is there, 0 to 1.
+    pub fn share_there(&mut self, stream: u32, seconds: f64) -> f32 {
+        self.streamed(stream).map_or(0.0, |(_, own)| own.share(seconds))
+    }
+
+    /// Returns why the picture of a time may never be there.
+    pub fn obstacle(&mut self, stream: u32, seconds: f64) -> Option<String> {
+        self.streamed(stream).and_then(|(_, own)| own.obstacle(seconds))
     }
 
     /// Returns the part of the opening that is done, 0 to 1.
@@ -340,6 +508,7 @@ impl Player {
     pub fn draw(&mut self, time: f32, pose: &[f32], lens: &[f32]) -> Result<(), String> {
         let Some(shown) = &mut self.shown else { return Ok(()) };
         let GpuContext { device, queue, .. } = &self.context;
+        let time = shown.stream.as_mut().map_or(time, |stream| stream.time_of_picture(time));
         let size = UVec2::new(self.configuration.width, self.configuration.height);
         let view = view(pose, lens, size, time, shown.kept.optics)?;
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("gs4d page") });

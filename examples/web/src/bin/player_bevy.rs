@@ -10,7 +10,7 @@ use bevy::prelude::*;
 use bevy::render::renderer::RenderQueue;
 use bevy_gs4d::prelude::*;
 use bevy_gs4d::scene::RuntimeScene;
-use gs4d_web::{About, Opening, Step, report_panics};
+use gs4d_web::{About, Opening, OpeningStep, report_panics};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use wasm_bindgen::prelude::wasm_bindgen;
 use web_sys::HtmlCanvasElement;
@@ -125,8 +125,14 @@ impl Player {
     pub fn step(&mut self) -> Result<Option<About>, String> {
         if let Some(mut opening) = self.opening.take() {
             match opening.advance()? {
-                Step::Part => self.opening = Some(opening),
-                Step::Scene(scene) => {
+                OpeningStep::Part => self.opening = Some(opening),
+                OpeningStep::Scene(scene) if scene.chunks.is_some() => {
+                    let remedy = "leave engine=bevy out of the link, or join the files by gs4d join";
+                    return Err(format!(
+                        "it is the index of a capture in chunk files, which this player does not fetch: {remedy}"
+                    ));
+                }
+                OpeningStep::Scene(scene) => {
                     self.about = Some(About::of(&scene));
                     let mut state = self.shared.state();
                     (state.scene, state.shown, state.failed) = (Some(scene), false, None);
