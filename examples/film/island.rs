@@ -2,7 +2,7 @@
 //! carp streamers in the wind and a fire.
 //!
 //! In: a time in seconds. Out: the pose and shape of everything that moves, and ten named points on it. The scene is a
-//! loop of [`SECONDS`] and depends on the time alone.
+//! loop of [`SECONDS`], or of a [`Take`], and depends on the time alone.
 
 use bevy::asset::RenderAssetUsages;
 use bevy::camera::visibility::NoFrustumCulling;
@@ -30,9 +30,18 @@ const CROWN: Vec3 = Vec3::new(-0.48, 0.78, -0.18);
 /// Height below which a petal is among the grass.
 const GRASS: f32 = 0.05;
 
+/// A longer take, for captures of minutes: the loop is repeated, but petals fall along other ways each time, and the sun
+/// moves, and is low and warm in the middle of the take.
+#[derive(Resource, Clone, Copy)]
+pub struct Take {
+    /// Its length, a whole number of loops.
+    pub seconds: f32,
+}
+
 /// A thing that moves.
 #[derive(Component, Clone, Copy)]
 enum Moving {
+    Sun,
     Petal(usize),
     Flame(usize),
     /// A paper lantern, which hangs from this point.
@@ -70,7 +79,7 @@ pub fn spawn(
             .map(|[red, green, blue]| matte(red, green, blue));
     let petals = [[0.98, 0.72, 0.8], [0.95, 0.58, 0.7], [1.0, 0.86, 0.9]].map(|[r, g, b]| matte(r, g, b));
     let sun = DirectionalLight { shadow_maps_enabled: true, illuminance: 6200.0, color: SUN, ..default() };
-    commands.spawn((sun, Transform::from_xyz(2.5, 3.6, 2.0).looking_at(Vec3::ZERO, Vec3::Y)));
+    commands.spawn((Moving::Sun, sun, sun_pose(0.0)));
 
     commands.spawn((Mesh3d(meshes.add(island())), MeshMaterial3d(white.clone())));
     // The gate: two posts, two beams.
@@ -206,10 +215,14 @@ const WARM: Color = Color::srgb(1.0, 0.62, 0.3);
 /// Moves everything to its place at a time in seconds.
 pub fn place(world: &mut World, seconds: f32) {
     let turn = seconds / SECONDS;
+    let loops = world.get_resource().map_or(1, |take: &Take| (take.seconds / SECONDS).round().max(1.0) as usize);
+    // The part of the take that is over; a loop alone has one sun.
+    let day = if loops > 1 { (turn / loops as f32).fract() } else { 0.0 };
     let mut moving = world.query::<(&Moving, &mut Transform)>();
     for (part, mut pose) in moving.iter_mut(world) {
         match *part {
-            Moving::Petal(index) => *pose = petal(index, turn),
+            Moving::Petal(index) => *pose = petal(index, turn, loops),
+            Moving::Sun => *pose = sun_pose(day),
             Moving::Flame(index) => *pose = flame(index, turn).0,
             Moving::Lantern(hook) => {
                 let swing = 0.22 * (TAU * (turn + hook.x)).sin();
@@ -228,7 +241,7 @@ pub fn place(world: &mut World, seconds: f32) {
     }
     for (part, mut visibility) in world.query::<(&Moving, &mut Visibility)>().iter_mut(world) {
         if let Moving::OnPetal(index) = *part {
-            let Transform { translation, scale, .. } = petal(index, turn);
+            let Transform { translation, scale, .. } = petal(index, turn, loops);
             // From half of its width on.
             let is_seen = translation.y > GRASS && scale.x > 0.5 * petal_size(index);
             *visibility = if is_seen { Visibility::Inherited } else { Visibility::Hidden };
@@ -239,6 +252,9 @@ pub fn place(world: &mut World, seconds: f32) {
         if let Moving::FireLight = part {
             light.intensity = 26_000.0 * flicker;
         }
+    }
+    for mut sun in world.query::<&mut DirectionalLight>().iter_mut(world) {
+        sun.color = SUN.mix(&WARM, lowness(day));
     }
     let mut cloths = world.query::<(&Moving, &Mesh3d)>();
     let streamers: Vec<_> = cloths
@@ -285,17 +301,31 @@ fn grown(age: f32, edge: f32) -> f32 {
     part * part * (3.0 - 2.0 * part)
 }
 
-/// Returns the pose of a petal: from the crown it sails around the island, down past its rim.
-fn petal(index: usize, turn: f32) -> Transform {
-    let age = (turn + chance(index, 11)).fract();
-    let angle = TAU * (chance(index, 12) + 0.42 * age);
-    let from = CROWN + 0.3 * Vec3::new(angle.cos(), 0.4 * chance(index, 13), angle.sin());
-    let far = 0.7 + 0.35 * chance(index, 14);
-    let to = Vec3::new(far * angle.cos(), -0.35 - 0.25 * chance(index, 15), far * angle.sin());
+/// Returns how low the sun is, 0 to 1, when this part of the take is over.
+fn lowness(day: f32) -> f32 {
+    0.5 - 0.5 * (TAU * day).cos()
+}
+
+/// Returns where the sun shines from when this part of the take is over.
+fn sun_pose(day: f32) -> Transform {
+    let from = Vec3::new(2.5, 3.6 - 2.0 * lowness(day), 2.0);
+    Transform::from_translation(Quat::from_rotation_y((TAU * day).sin()) * from).looking_at(Vec3::ZERO, Vec3::Y)
+}
+
+/// Returns the pose of a petal: from the crown it sails around the island, down past its rim. Of the given number of
+/// loops, each has another way.
+fn petal(index: usize, turn: f32, loops: usize) -> Transform {
+    let begun = turn + chance(index, 11);
+    let age = begun.fract();
+    let way = index + PETALS * (begun as usize % loops);
+    let angle = TAU * (chance(way, 12) + 0.42 * age);
+    let from = CROWN + 0.3 * Vec3::new(angle.cos(), 0.4 * chance(way, 13), angle.sin());
+    let far = 0.7 + 0.35 * chance(way, 14);
+    let to = Vec3::new(far * angle.cos(), -0.35 - 0.25 * chance(way, 15), far * angle.sin());
     let flutter = 0.045 * Vec3::new((TAU * (2.0 * age + chance(index, 16))).sin(), 0.0, (TAU * 2.0 * age).cos());
-    let way = 1.0 - (1.0 - age).powf(1.4);
+    let gone = 1.0 - (1.0 - age).powf(1.4);
     Transform {
-        translation: from.lerp(to, way) + 0.18 * Vec3::Y * (TAU / 2.0 * age).sin() + flutter,
+        translation: from.lerp(to, gone) + 0.18 * Vec3::Y * (TAU / 2.0 * age).sin() + flutter,
         rotation: Quat::from_euler(EulerRot::YXZ, angle, TAU * (2.0 * age + chance(index, 17)), TAU * age),
         scale: Vec3::new(1.0, 0.28, 0.72) * petal_size(index) * grown(age, 0.12),
     }

@@ -249,3 +249,22 @@ fn the_island_is_a_loop_that_depends_on_the_time_alone() {
         assert!(far < half, "{} is in sight of the cameras: {far} of {half}", pose.translation);
     }
 }
+
+#[test]
+fn a_take_is_a_longer_loop_whose_parts_differ() {
+    let mut world = island_world();
+    world.insert_resource(island::Take { seconds: 3.0 * island::SECONDS });
+    let color = |world: &mut World| world.query::<&DirectionalLight>().single(world).expect("one sun").color;
+    let first = places(&mut world, 0.0).0;
+    let begin = color(&mut world);
+    let [later, again, last] =
+        [1.3, 1.3 + island::SECONDS, 3.0 * island::SECONDS].map(|time| places(&mut world, time).0);
+    assert_eq!(color(&mut world), begin, "the light of the end is that of the beginning");
+    places(&mut world, 1.5 * island::SECONDS);
+    assert_ne!(color(&mut world), begin, "the light of the middle is another");
+    let moved = |one: &[Transform], other: &[Transform]| {
+        one.iter().zip(other).filter(|(one, other)| one.translation.distance(other.translation) > 0.02).count()
+    };
+    assert_eq!(moved(&first, &last), 0, "the end of the take is its beginning");
+    assert!(moved(&later, &again) > 100, "petals fall along other ways in each loop: {}", moved(&later, &again));
+}
