@@ -162,7 +162,9 @@ fn chunks_are_in_layers_and_the_index_lists_them() {
 
     let info = gs4d(&arguments!["info", &index, "--json"]).json();
     let bytes = sum - size(&index);
-    let expected = serde_json::json!({ "files": 4, "stretches": 2, "layers": 2, "gaussians": 1200, "bytes": bytes });
+    let expected = serde_json::json!({
+        "files": 4, "stretches": 2, "layers": 2, "gaussians": 1200, "bytes": bytes, "decibels_per_megabyte": [],
+    });
     assert_eq!((&info["chunks"], &info["gaussians"]), (&expected, &0.into()), "the files of an empty package: {info}");
     let text = gs4d(&arguments!["info", &index]).text();
     assert!(text.contains("the index of 4 chunk files: 1200 Gaussians in 2 layers over 2 stretches"), "{text}");
