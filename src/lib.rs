@@ -112,7 +112,7 @@
 //! other, as are `plugin` and [`offline`]: a game compiles neither datasets nor metrics. Code that two rings need is in
 //! a ring inside both.
 //!
-//! * `plugin` has rings of its own, `component ▶ asset ▶ playback ▶ render ▶ stream ▶ pbr, picker, stereo ▶
+//! * `plugin` has rings of its own, `component ▶ asset ▶ playback ▶ render, sound ▶ stream ▶ pbr, picker, stereo ▶
 //!   picking_backend, inspector, testing`, of which `pbr`, `picking_backend` (feature `picking`), `inspector` and `testing` are
 //!   features. The crate root re-exports them: a game writes `bevy_gs4d::playback`.
 //! * A picture is a [`Picture`](view::Picture), not an `Image`: Bevy and the crate `image` have an `Image` each, and
@@ -125,8 +125,9 @@
 //! # Modules for games
 //!
 //! [`asset`] loads and reloads files, and reports their states. [`picker`] finds the Gaussian that a ray hits.
-//! [`stereo`] has two eyes on one head, [`stream`] plays captures of minutes in fixed memory. [`inspector`] is a panel that shows and edits captures, [`testing`] renders an
-//! app to pictures without a window. `docs/guide.md` is the guide for games, `docs/command.md` the guide of the
+//! [`sound`] plays what is heard beside captures, [`stereo`] has two eyes on one head, [`stream`] plays captures of
+//! minutes in fixed memory. [`inspector`] is a panel that shows and edits captures, [`testing`] renders an app to
+//! pictures without a window. `docs/guide.md` is the guide for games, `docs/command.md` the guide of the
 //! command, `docs/filming.md` the chapter from several cameras to a capture.
 //!
 //! [`GaussianCapturePlugins`] is a group: `GaussianCapturePlugins.build().disable::<CapturePbrPlugin>()` leaves a part
@@ -141,9 +142,11 @@
 //! | [`CaptureStreamSettings`](stream::CaptureStreamSettings), [`CaptureStreamState`](stream::CaptureStreamState) | captures in chunk files | the game; the plugins |
 //! | [`CaptureSocket`](playback::CaptureSocket), [`SocketState`](playback::SocketState) | children of captures | the game; the first requires the second |
 //! | [`CaptureCollider`](playback::CaptureCollider), [`ColliderState`](playback::ColliderState) | children of captures | the game; the first requires the second |
+//! | [`CaptureSound`](sound::CaptureSound), [`SoundState`](sound::SoundState) | captures; `SoundState` also sounds of timelines | the game; the plugins |
 //! | [`PlaybackClock`](playback::PlaybackClock) | an entity of its own; timelines | the game; the plugins on timelines |
 //! | [`TimelinePlayer`](playback::TimelinePlayer) | a timeline in the world | the game |
 //! | [`TimelineTrack`](playback::TimelineTrack), [`ClipFade`](playback::ClipFade) | children of timelines | the plugins, or the game |
+//! | [`TimelineSound`](sound::TimelineSound) | children of timelines | the plugins |
 //! | [`CastsShadows`](pbr::CastsShadows), [`ReceivesShadows`](pbr::ReceivesShadows), [`CaptureLight`](pbr::CaptureLight), [`CaptureContactShadow`](pbr::CaptureContactShadow) | captures | the game |
 //! | [`CaptureViewSettings`](render::CaptureViewSettings), [`CapturePickingCamera`](picking_backend::CapturePickingCamera) | cameras | the game |
 //! | [`StereoRig`](stereo::StereoRig) | a head | [`spawn_stereo`](stereo::spawn_stereo) |
@@ -156,6 +159,7 @@
 //! | [`PlaybackSystems::Clocks`](playback::PlaybackSystems::Clocks) | `Update` | advance clocks |
 //! | [`PlaybackSystems::Timelines`](playback::PlaybackSystems::Timelines) | `Update`, after `Clocks` | advance timelines, set up their tracks |
 //! | [`PlaybackSystems::Advance`](playback::PlaybackSystems::Advance) | `Update`, after `Timelines` | advance captures; send the messages about playing |
+//! | [`CaptureSoundSystems`](sound::CaptureSoundSystems) | `Update`, after `Advance` | update the states of sounds |
 //! | [`CaptureStreamSystems`](stream::CaptureStreamSystems) | `Update`, after `Advance` | load and give up chunk files; send the messages about streaming |
 //! | [`PlaybackSystems::Colliders`](playback::PlaybackSystems::Colliders) | `Update`, after `Advance` | give entities with colliders the mesh of the time; send [`CaptureColliderChanged`](playback::CaptureColliderChanged) |
 //! | [`PlaybackSystems::Sockets`](playback::PlaybackSystems::Sockets) | `PostUpdate`, after Bevy's `AnimationSystems`, before `TransformSystems::Propagate` | move entities with sockets |
@@ -182,15 +186,17 @@
 //! |---|---|---|
 //! | none | [`view`], [`gaussian`], [`scene`], [`codec`], [`mod@reference`]: no GPU, no Bevy | |
 //! | `renderer` | [`renderer`], on wgpu | |
-//! | `offline` | [`offline`] | `renderer` |
-//! | `bevy` (default) | `plugin`: [`asset`], [`playback`], [`render`], [`stream`], [`picker`], [`stereo`]; [`prelude`] | `renderer` |
+//! | `offline` | [`offline`] | `renderer`, `sound` |
+//! | `bevy` (default) | `plugin`: [`asset`], [`playback`], [`render`], [`sound`], [`stream`], [`picker`], [`stereo`]; [`prelude`] | `renderer` |
 //! | `pbr` (default) | [`pbr`]: captures among Bevy's lit meshes | `bevy` |
 //! | `picking` (default) | pointer events on captures | `bevy` |
+//! | `sound` | decoding of sound files ([`codec::sound`]) | |
+//! | `bevy_audio` | sounds are heard through Bevy's audio | `bevy`, `sound` |
 //! | `fourdgs` | reading and writing `.4dgs` files | |
 //! | `cli` | [`cli`], the `gs4d` command; never compiles Bevy | `offline`, `fourdgs` |
 //! | `inspector` | [`inspector`]: a panel that shows and edits captures | `bevy` |
 //! | `testing` | [`testing`]: Bevy apps without a window, drawn into pictures | `bevy` |
-//! | `viewer` | what the examples need: a window, lit meshes | `pbr`, `picking`, `inspector`, `testing` |
+//! | `viewer` | what the examples need: a window, lit meshes | `pbr`, `picking`, `inspector`, `sound`, `testing` |
 //! | `openxr` | the example `walkthrough` for a headset, untried | `viewer` |
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![cfg_attr(

@@ -50,6 +50,8 @@ pub use crate::plugin::render::{
     CaptureBudget, CaptureDetail, CaptureSettings, CaptureStatistics, CaptureUploadBudget, CaptureViewSettings,
 };
 #[doc(no_inline)]
+pub use crate::plugin::sound::CaptureSound;
+#[doc(no_inline)]
 pub use crate::plugin::stream::{
     CaptureBuffered, CaptureBuffering, CaptureStalled, CaptureStreamSettings, CaptureStreamState,
 };

@@ -29,7 +29,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
 use verbs::{
     ablate, bake, bench, collide, compare, compress, convert, detail, edit, eval, export, fine_tune, fleet, footage,
-    info, join, mask, prune, render, score, socket, split, synth, train,
+    info, join, mask, prune, render, score, socket, sound, split, synth, train,
 };
 
 /// The exit code after a panic, a defect of this crate.
@@ -70,6 +70,7 @@ enum Verb {
     Split(split::SplitVerb),
     Socket(socket::SocketVerb),
     Collide(collide::CollideVerb),
+    Sound(sound::SoundVerb),
     Compare(compare::Compare),
     Synth(synth::Synth),
     Bench(bench::Bench),
@@ -101,6 +102,7 @@ impl Verb {
             Self::Split(verb) => verb.run(),
             Self::Socket(verb) => verb.run(),
             Self::Collide(verb) => verb.run(),
+            Self::Sound(verb) => verb.run(),
             Self::Compare(verb) => verb.run(),
             Self::Synth(verb) => verb.run(),
             Self::Bench(verb) => verb.run(),

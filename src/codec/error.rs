@@ -6,6 +6,7 @@ use super::checkpoint::CheckpointError;
 use super::import::ImportError;
 use super::options::InvalidOption;
 use super::package::PackageError;
+use super::sound::SoundError;
 use crate::gaussian::InvalidGaussian;
 use crate::scene::edit::EditListError;
 use std::io;
@@ -52,6 +53,9 @@ pub enum CodecErrorKind {
     /// A file that is not a list of edits.
     #[error(transparent)]
     Edits(#[from] EditListError),
+    /// A sound file that cannot be used.
+    #[error(transparent)]
+    Sound(#[from] SoundError),
 }
 
 impl CodecErrorKind {

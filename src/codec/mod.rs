@@ -4,8 +4,8 @@
 //! `format` is the table of formats: [`checkpoint`] reads the files of the 4DGS trainer (`.pth`), of gsplat and of
 //! nerfstudio, [`package`] reads and writes the format of this crate (`.gs4d`), `import` reads those of other makes.
 //! `found` finds the capture of a file, which may be inside of gzip or of a zip archive; `looks` says what a file is
-//! that is no capture. `edits` reads a list of edits. [`stream`] says which files of a capture in chunk files are fetched
-//! next.
+//! that is no capture. `edits` reads a list of edits, [`sound`] what is heard beside a capture. [`stream`] says which
+//! files of a capture in chunk files are fetched next.
 
 pub(crate) mod budget;
 pub mod checkpoint;
@@ -24,6 +24,7 @@ pub(crate) mod looks;
 pub(crate) mod npy;
 pub(crate) mod options;
 pub mod package;
+pub mod sound;
 mod start;
 pub mod stream;
 pub(crate) mod text;

@@ -7,7 +7,7 @@
 use super::pbr;
 #[cfg(feature = "picking")]
 use super::picking_backend;
-use super::{asset, playback, render, stereo, stream};
+use super::{asset, playback, render, sound, stereo, stream};
 use bevy::app::plugin_group;
 
 plugin_group! {
@@ -43,6 +43,7 @@ plugin_group! {
         playback:::CapturePlaybackPlugin,
         render:::CaptureRenderPlugin,
         stream:::CaptureStreamPlugin,
+        sound:::CaptureSoundPlugin,
         stereo:::StereoPlugin,
         #[cfg(feature = "pbr")]
         pbr:::CapturePbrPlugin,

@@ -5,12 +5,13 @@
 //! `component`, whose items are at the root and in [`asset`]. Each module uses only modules before it:
 //!
 //! ```text
-//! component ──▶ asset ──▶ playback ──▶ render ──▶ stream ──▶ pbr, picker, stereo ──▶ picking_backend, inspector, testing
+//! component ──▶ asset ──▶ playback ──▶ render, sound ──▶ stream ──▶ pbr, picker, stereo ──▶ picking_backend, inspector, testing
 //! ```
 //!
 //! * `component`: the capture asset, and the component that places it in the world
 //! * [`asset`]: loading and saving captures, and the state of loading on each entity
 //! * [`playback`]: the time of each capture; shared clocks and timelines
+//! * [`sound`]: what is heard beside captures, at the time that is drawn
 //! * [`render`]: drawing captures into the targets of cameras, and their settings
 //! * [`stream`]: captures of minutes in chunk files, of which only what is played next is in memory
 //! * `pbr` (feature `pbr`): captures among Bevy's lit meshes
@@ -35,6 +36,7 @@ pub mod picker;
 pub mod picking_backend;
 pub mod playback;
 pub mod render;
+pub mod sound;
 pub mod stereo;
 pub mod stream;
 #[cfg(feature = "testing")]

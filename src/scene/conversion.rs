@@ -143,13 +143,25 @@ impl Conversion {
     /// As [`advance`](Self::advance).
     pub(crate) fn finish(mut self) -> Result<RuntimeScene, InvalidGaussian> {
         while self.advance(usize::MAX)? {}
-        let GaussianScene { form, environment, filter, trained_with, playback, sockets, colliders, chunks, .. } =
-            self.scene;
+        let GaussianScene {
+            form, environment, filter, trained_with, playback, sockets, colliders, sound, chunks, ..
+        } = self.scene;
         let form = match form {
             SceneForm::Trained(Trained { harmonics, .. }) => Form::Sliced(Sliced { gaussians: self.sliced, harmonics }),
             SceneForm::Ready(form) => form,
         };
         let levels = self.before;
-        Ok(RuntimeScene { form, environment, filter, trained_with, playback, levels, sockets, colliders, chunks })
+        Ok(RuntimeScene {
+            form,
+            environment,
+            filter,
+            trained_with,
+            playback,
+            levels,
+            sockets,
+            colliders,
+            sound,
+            chunks,
+        })
     }
 }

@@ -10,6 +10,7 @@ use super::form::{Form, SceneForm};
 use super::provenance::{PlaybackHints, TrainedWith};
 use super::runtime_scene::{Level, RuntimeScene, check_around, check_levels};
 use super::socket::{Socket, check_sockets};
+use super::sound_file::SoundFile;
 use crate::gaussian::Model;
 use std::sync::Arc;
 
@@ -32,6 +33,8 @@ pub struct GaussianScene {
     pub sockets: Vec<Socket>,
     /// Meshes of the solid parts; usually none. Levels of detail have none. Shared, because they do not change.
     pub colliders: Option<Arc<Colliders>>,
+    /// The sound that is played beside the picture; usually none. Levels of detail have none. Shared, likewise.
+    pub sound: Option<Arc<SoundFile>>,
     /// The chunk files that have its Gaussians; `None` for every capture but the index of one in chunk files.
     pub chunks: Option<Arc<ChunkTable>>,
 }
@@ -71,6 +74,7 @@ impl GaussianScene {
         check_around(self.len(), self.filter.as_ref(), self.environment.as_ref())?;
         check_sockets(&self.sockets)?;
         self.colliders.as_deref().map_or(Ok(()), Colliders::check)?;
+        self.sound.as_deref().map_or(Ok(()), SoundFile::check)?;
         self.chunks.as_deref().map_or(Ok(()), ChunkTable::check)?;
         check_levels(&self.levels, &self.trained_with, self.environment.is_some())
     }
@@ -87,6 +91,7 @@ impl From<RuntimeScene> for GaussianScene {
             levels: scene.levels,
             sockets: scene.sockets,
             colliders: scene.colliders,
+            sound: scene.sound,
             chunks: scene.chunks,
         }
     }

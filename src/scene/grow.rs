@@ -60,6 +60,7 @@ pub fn grow(
         levels: Vec::new(),
         sockets: scene.sockets.clone(),
         colliders: scene.colliders.clone(),
+        sound: scene.sound.clone(),
         chunks: None,
     })
 }

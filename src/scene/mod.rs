@@ -28,6 +28,7 @@ mod runtime_scene;
 mod select;
 mod sliced;
 mod socket;
+mod sound_file;
 pub mod synth;
 
 pub use bounds::{Bounds, BoundsOverTime};
@@ -49,3 +50,4 @@ pub use runtime_scene::{Level, RuntimeScene};
 pub use sliced::Sliced;
 pub(crate) use socket::check_sockets;
 pub use socket::{Socket, SocketSample};
+pub use sound_file::SoundFile;

@@ -12,6 +12,7 @@ use super::form::Form;
 use super::provenance::{PlaybackHints, TrainedWith};
 use super::sliced::Sliced;
 use super::socket::{Socket, check_sockets};
+use super::sound_file::SoundFile;
 use crate::gaussian::{Gaussian, Harmonics};
 use crate::view::{Background, Optics};
 use glam::Vec3;
@@ -36,12 +37,14 @@ pub struct RuntimeScene {
     pub sockets: Vec<Socket>,
     /// Meshes of the solid parts; usually none. Levels of detail have none. Shared, because they do not change.
     pub colliders: Option<Arc<Colliders>>,
+    /// The sound that is played beside the picture; usually none. Levels of detail have none. Shared, likewise.
+    pub sound: Option<Arc<SoundFile>>,
     /// The chunk files that have its Gaussians; `None` for every capture but the index of one in chunk files.
     pub chunks: Option<Arc<ChunkTable>>,
 }
 
 /// A level of detail: a capture of fewer Gaussians, without levels, environment map, temporal filter, sockets,
-/// colliders and chunk files.
+/// colliders, sound and chunk files.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Level {
     /// The largest size on the screen (`pixels_across`) at which it looks nearly the same as all Gaussians, pixels.
@@ -63,6 +66,7 @@ impl RuntimeScene {
             levels: Vec::new(),
             sockets: Vec::new(),
             colliders: None,
+            sound: None,
             chunks: None,
         }
     }
@@ -110,6 +114,7 @@ impl RuntimeScene {
         check_around(self.len(), self.filter.as_ref(), self.environment.as_ref())?;
         check_sockets(&self.sockets)?;
         self.colliders.as_deref().map_or(Ok(()), Colliders::check)?;
+        self.sound.as_deref().map_or(Ok(()), SoundFile::check)?;
         self.chunks.as_deref().map_or(Ok(()), ChunkTable::check)?;
         check_levels(&self.levels, &self.trained_with, self.environment.is_some())
     }
@@ -176,8 +181,8 @@ pub(super) fn check_levels(
         if !own.levels.is_empty() || own.environment.is_some() || own.filter.is_some() {
             return Err("a level of detail that has levels, an environment map or a temporal filter itself");
         }
-        if !own.sockets.is_empty() || own.colliders.is_some() {
-            return Err("a level of detail that has sockets or colliders itself");
+        if !own.sockets.is_empty() || own.colliders.is_some() || own.sound.is_some() {
+            return Err("a level of detail that has sockets, colliders or a sound itself");
         }
         if own.chunks.is_some() {
             return Err("a level of detail that is in chunk files itself");

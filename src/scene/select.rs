@@ -40,6 +40,7 @@ impl GaussianScene {
             levels: Vec::new(),
             sockets: self.sockets.clone(),
             colliders: self.colliders.clone(),
+            sound: self.sound.clone(),
             chunks: None,
         }
     }

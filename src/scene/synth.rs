@@ -75,6 +75,7 @@ pub fn synthesize(settings: &SynthSettings) -> GaussianScene {
         levels: Vec::new(),
         sockets: Vec::new(),
         colliders: None,
+        sound: None,
         chunks: None,
     }
 }

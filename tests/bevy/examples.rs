@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use tempfile::TempDir;
 
-const EXAMPLES: [&str; 7] = ["minimal", "play", "scene", "timeline", "walkthrough", "headless", "budget"];
+const EXAMPLES: [&str; 8] = ["minimal", "play", "scene", "timeline", "walkthrough", "headless", "budget", "sound"];
 
 /// Returns the path of an example: tests are in the folder `deps` next to `examples`.
 fn program(example: &str) -> PathBuf {

@@ -37,6 +37,7 @@ mod scenes;
 mod shade;
 mod shadows;
 mod sockets;
+mod sound;
 mod steady;
 mod stereo;
 mod stream;
@@ -66,8 +67,10 @@ mod support {
     pub mod pipelines;
     pub mod playback_app;
     pub mod pth;
+    pub mod random;
     pub mod skip;
     pub mod spans;
     pub mod waiting;
     pub mod warning_layer;
+    pub mod wave;
 }

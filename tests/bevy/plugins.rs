@@ -19,6 +19,7 @@ use bevy_gs4d::picking_backend::CapturePickingPlugin;
 use bevy_gs4d::playback::CapturePlaybackPlugin;
 use bevy_gs4d::prelude::*;
 use bevy_gs4d::render::CaptureRenderPlugin;
+use bevy_gs4d::sound::CaptureSoundPlugin;
 use bevy_gs4d::stereo::StereoPlugin;
 use bevy_gs4d::testing;
 use image::RgbaImage;
@@ -64,6 +65,7 @@ fn every_part_of_the_group_can_be_left_out() {
         without::<StereoPlugin>(),
         without::<CapturePbrPlugin>(),
         without::<CapturePickingPlugin>(),
+        without::<CaptureSoundPlugin>(),
     ];
     for (index, parts) in parts.into_iter().enumerate() {
         let mut app = App::new();
@@ -94,7 +96,7 @@ fn parts_without_the_part_that_loads_are_named_and_have_no_effect() {
     let mut app = App::new();
     app.add_plugins((MinimalPlugins, AssetPlugin::default(), without::<CaptureAssetPlugin>()));
     let warnings = start(&mut app);
-    for part in ["CapturePlaybackPlugin", "CaptureRenderPlugin", "CapturePickingPlugin"] {
+    for part in ["CapturePlaybackPlugin", "CaptureRenderPlugin", "CaptureSoundPlugin", "CapturePickingPlugin"] {
         let about =
             warnings.iter().filter(|warning| warning.starts_with(part) && warning.contains("CaptureAssetPlugin"));
         assert_eq!(about.count(), 1, "one warning names {part} and what it needs: {warnings:?}");

@@ -58,6 +58,9 @@ fn reflected() -> Vec<(String, &'static str)> {
         bevy_gs4d::render::CropBox,
         bevy_gs4d::render::DepthWrite,
         bevy_gs4d::renderer::Design,
+        bevy_gs4d::sound::CaptureSound,
+        bevy_gs4d::sound::SoundState,
+        bevy_gs4d::sound::TimelineSound,
         bevy_gs4d::stereo::Eye,
         bevy_gs4d::stereo::SideBySide,
         bevy_gs4d::stereo::StereoRig,
@@ -79,8 +82,10 @@ fn named() -> Vec<(String, &'static str)> {
         bevy_gs4d::asset::CaptureTransformer,
         bevy_gs4d::asset::GaussianCapture,
         bevy_gs4d::asset::PackageSaver,
+        bevy_gs4d::asset::SoundLoader,
         bevy_gs4d::playback::Timeline,
         bevy_gs4d::playback::TimelineLoader,
+        bevy_gs4d::sound::SoundTrack,
     ]
 }
 

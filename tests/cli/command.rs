@@ -173,9 +173,9 @@ fn options_without_a_measured_benefit_are_listed_as_experimental() {
 
 #[test]
 fn reports_are_text_without_json() {
-    const VERBS: [&str; 19] = [
+    const VERBS: [&str; 20] = [
         "info", "convert", "export", "render", "compare", "synth", "bench", "score", "prune", "mask", "eval", "ablate",
-        "bake", "detail", "join", "split", "edit", "socket", "collide",
+        "bake", "detail", "join", "split", "edit", "socket", "collide", "sound",
     ];
     let folder = folder();
     let path = scene(&folder, "50");

@@ -39,6 +39,7 @@ mod signals;
 #[cfg(target_os = "linux")]
 mod sizes;
 mod socket;
+mod sound;
 mod train;
 
 #[path = "../support"]
@@ -58,4 +59,5 @@ mod support {
     pub mod skip;
     #[cfg(target_os = "linux")]
     pub mod small_capture;
+    pub mod wave;
 }

@@ -557,6 +557,7 @@ const ALWAYS: &[(&str, &[&str])] = &[
     ("split", &["--chunk", "--data", "--layers", "--level", "--out"]),
     ("socket", &["--list", "--points", "--remove"]),
     ("collide", &["--out", "--remove"]),
+    ("sound", &["--extract", "--out", "--remove"]),
     ("synth", &["--grow", "--level", "--out", "--seed", "--sh-degree"]),
     (
         "bench",
@@ -740,7 +741,9 @@ const ALWAYS: &[(&str, &[&str])] = &[
     (
         "bake",
         &[
+            "--audio",
             "--background",
+            "--colliders",
             "--data",
             "--duration",
             "--engine",
@@ -758,6 +761,7 @@ const ALWAYS: &[(&str, &[&str])] = &[
             "--ratio",
             "--resolution",
             "--static",
+            "--stream",
             "--target-size",
             "--time-interval",
             "--trust-images",

@@ -43,6 +43,8 @@ fn no_verb_writes_over_an_input() {
         arguments!["mask", scene, "-o", scene].to_vec(),
         arguments!["socket", scene, "--name", "a", "--at", "0,0,0", "--time", "0", "-o", scene].to_vec(),
         arguments!["collide", scene, "-o", scene].to_vec(),
+        arguments!["sound", scene, &settings, "-o", scene].to_vec(),
+        arguments!["sound", scene, "--extract", scene].to_vec(),
         arguments!["mask", scene, "--filter", "interval", "--data", data, "-o", &image].to_vec(),
         arguments!["score", scene, "--data", data, "--out", scene].to_vec(),
         arguments!["score", scene, "--data", data, "--out", &trained_on].to_vec(),

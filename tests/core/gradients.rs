@@ -147,9 +147,19 @@ impl Case {
             ..TrainedWith::default()
         };
         let form = SceneForm::Trained(trained.clone());
-        let (environment, filter, playback, levels, sockets, colliders, chunks) = Default::default();
-        let scene =
-            GaussianScene { form, environment, filter, trained_with, playback, levels, sockets, colliders, chunks };
+        let (environment, filter, playback, levels, sockets, colliders, sound, chunks) = Default::default();
+        let scene = GaussianScene {
+            form,
+            environment,
+            filter,
+            trained_with,
+            playback,
+            levels,
+            sockets,
+            colliders,
+            sound,
+            chunks,
+        };
         scene.into_runtime_with(&self.slice).expect("valid Gaussians")
     }
 

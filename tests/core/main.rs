@@ -42,6 +42,8 @@ mod score;
 #[cfg(feature = "offline")]
 mod score_formula;
 mod sog;
+#[cfg(feature = "sound")]
+mod sounds;
 mod splatv;
 mod spz_and_gltf;
 mod thin;
@@ -61,6 +63,8 @@ mod support {
     pub mod gzip;
     #[cfg(feature = "offline")]
     pub mod npy;
+    #[cfg(feature = "sound")]
+    pub mod ogg;
     pub mod other_makes;
     #[cfg(feature = "offline")]
     pub mod own_process;
@@ -73,4 +77,6 @@ mod support {
     pub mod skip;
     pub mod thin;
     pub mod trained;
+    #[cfg(feature = "sound")]
+    pub mod wave;
 }

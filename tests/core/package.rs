@@ -12,7 +12,8 @@ use bevy_gs4d::gaussian::{Gaussian, Harmonics, Model, Parameters};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{
     ChunkFile, ChunkTable, ColliderMesh, ColliderStretch, Colliders, Environment, Form, GaussianScene, Level,
-    PlaybackHints, RuntimeScene, SceneForm, Sliced, Socket, SocketSample, Trained, TrainedCameras, TrainedWith, UpAxis,
+    PlaybackHints, RuntimeScene, SceneForm, Sliced, Socket, SocketSample, SoundFile, Trained, TrainedCameras,
+    TrainedWith, UpAxis,
 };
 use bytemuck::{Zeroable, cast_slice};
 use proptest::prelude::*;
@@ -107,6 +108,7 @@ fn scene(shape: &Shape, seed: u64) -> GaussianScene {
         levels: Vec::new(),
         sockets: Vec::new(),
         colliders: None,
+        sound: None,
         chunks: None,
     }
 }
@@ -613,10 +615,30 @@ fn detailed() -> GaussianScene {
         let shape = Shape { model: None, count, ..SMALL };
         let scene = scene(&shape, 30 + count as u64);
         let SceneForm::Ready(form) = scene.form else { panic!("the runtime form") };
-        let GaussianScene { environment, filter, trained_with, playback, levels, sockets, colliders, chunks, .. } =
-            scene;
-        let scene =
-            RuntimeScene { form, environment, filter, trained_with, playback, levels, sockets, colliders, chunks };
+        let GaussianScene {
+            environment,
+            filter,
+            trained_with,
+            playback,
+            levels,
+            sockets,
+            colliders,
+            sound,
+            chunks,
+            ..
+        } = scene;
+        let scene = RuntimeScene {
+            form,
+            environment,
+            filter,
+            trained_with,
+            playback,
+            levels,
+            sockets,
+            colliders,
+            sound,
+            chunks,
+        };
         Level { pixels, scene: Arc::new(scene) }
     };
     GaussianScene { levels: vec![level(64.0, 2), level(8.0, 1)], ..scene(&SMALL, 31) }
@@ -806,6 +828,22 @@ fn colliders_are_read_as_they_are_rounded() {
 }
 
 #[test]
+fn the_sound_file_is_read_byte_for_byte_and_skipped_by_older_readers() {
+    for length in [1, 2, 3, 4, 1000] {
+        let bytes: Vec<u8> = (0..length).map(|index| (index * 31 % 251) as u8 + 1).collect();
+        let sound = Some(Arc::new(SoundFile::new(&bytes).expect("a file has bytes")));
+        let file = pack(&GaussianScene { sound, ..scene(&SMALL, 35) });
+        let again = read(&file).expect("the package is good");
+        assert_eq!(again.sound.as_ref().map(|sound| sound.bytes()), Some(bytes.as_slice()), "{length} bytes come back");
+        let info = inspect(&file).expect("the package is good");
+        assert!(info.is_intact() && info.header.requires.is_empty(), "readers without sounds can read the scene");
+        let older = Parts::of(&file).swap("    sound: Some(", "    later: Some(").swap("\"sound\"", "\"later\"");
+        let without = read(&older.seal()).expect("an older reader reads the scene");
+        assert!(without.sound.is_none(), "an older reader skips the sound");
+    }
+}
+
+#[test]
 fn readers_without_colliders_skip_them() {
     let scene = with_colliders();
     let file = pack(&scene);
@@ -969,7 +1007,7 @@ fn bad_colliders_are_not_written() {
         (changed(|all| all.standing.points[2][1] = f32::INFINITY), "not finite"),
         (changed(|all| all.stretches[1].mesh.triangles[3][2] = 4), "a point that does not exist"),
         (changed(|all| all.stretches[0].to = 0.0), "does not begin"),
-        (nested, "sockets or colliders itself"),
+        (nested, "sockets, colliders or a sound itself"),
     ] {
         let error = package::write(Vec::new(), &bad, &WriteSettings::default()).expect_err("must be refused");
         let message = error.to_string();

@@ -50,6 +50,8 @@ impl Capture {
             quality: Quality::Lossless,
             order: PackedOrder::Spatial,
             level: None,
+            colliders: None,
+            audio: None,
             trust_images: false,
             keep_work: false,
         };

@@ -75,6 +75,7 @@ fn gradients_match_the_original() {
             levels: Vec::new(),
             sockets: Vec::new(),
             colliders: None,
+            sound: None,
             chunks: None,
         };
         let weights = |key: &str| golden::floats(&folder.join(expected[key].as_str().expect("a file")));

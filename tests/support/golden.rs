@@ -104,6 +104,7 @@ fn load_view(folder: &Path, scene_name: &str, json: &Value, view: &Value) -> Gol
         levels: Vec::new(),
         sockets: Vec::new(),
         colliders: None,
+        sound: None,
         chunks: None,
     }
     .into_runtime_with(&settings)

@@ -5,8 +5,10 @@
 //! `NAME.report.json` and `NAME.report.html` beside it, a summary of the report; the capture trained from a dataset as
 //! `NAME.trained.gs4d`; or the stages as jobs for many machines, or one of these jobs.
 
+use super::sound::note_length;
 use crate::cli::args::{
-    CheckpointArgs, EngineArgs, Given, Need, OrderArgs, PackageArgs, ScoringArgs, ValidationArgs, score_choice, values,
+    CheckpointArgs, EngineArgs, Given, Need, OrderArgs, PackageArgs, ScoringArgs, ValidationArgs, file_size,
+    score_choice, values,
 };
 use crate::cli::output::failure::Failure;
 use crate::cli::output::interrupt;
@@ -14,11 +16,14 @@ use crate::cli::output::note::note;
 use crate::cli::output::progress::Bars;
 use crate::cli::output::report::Report;
 use crate::cli::output::table::{bytes, lines};
+use crate::codec::sound::read_sound;
 use crate::offline::bake::job::{JOB_STAGES, Job, Scoring};
 use crate::offline::bake::plan::{Command, Source, plan};
 use crate::offline::bake::{
-    BakeSettings, Baked, bake, bake_job, check_pictures, obstacle_to_tuning, train_dataset, trained_path,
+    BakeSettings, Baked, bake, bake_job, check_pictures, chunk_folder, obstacle_to_tuning, train_dataset, trained_path,
+    wants_chunk_files, write_chunk_files,
 };
+use crate::offline::collide::CollideSettings;
 use crate::offline::compress::Quality;
 use crate::offline::dataset::SplitOptions;
 use crate::offline::engine::{Engine, EngineChoice};
@@ -27,11 +32,12 @@ use crate::offline::footage::{is_raw, prepared};
 use crate::offline::measure::evaluation::color_name;
 use crate::offline::prune::{Goal, ScoreChoice};
 use crate::offline::report::{BakeReport, Change};
+use crate::offline::segments::Chunks;
 use crate::offline::store::outputs::Files;
 use crate::offline::store::shard::Shard;
 use crate::offline::train::{FineTuneSettings, TrainError, TrainSettings, Usual};
 use crate::offline::work::write_beside;
-use crate::scene::{FilterKind, GaussianScene, MAX_SEGMENTS};
+use crate::scene::{ChunkTable, FilterKind, GaussianScene, MAX_SEGMENTS};
 use serde_json::json;
 use std::env;
 use std::ffi::OsString;
@@ -57,6 +63,7 @@ Examples:
   gs4d bake data/cameras --exposure --environment 256 -o even.gs4d     # real cameras before a background
   gs4d bake hook.trained.gs4d --data data/hook --resolution 2 --target-size 0.6 -o small.gs4d
   gs4d bake n3v.pth --data data/n3v --time-interval 0,10 --max-loss 0.2 --every 20 -o n3v.gs4d
+  gs4d bake chkpnt30000.pth --data data/singer --audio singer.ogg -o singer.gs4d
   gs4d bake n3v.pth --data data/n3v --engine gpu --shards 8 -o n3v.gs4d --plan n3v.json
 
 Beside the package: OUT.report.html with plots and pictures (open it in a browser; it needs no network) and OUT.report.json.
@@ -132,6 +139,17 @@ pub(crate) struct Bake {
     quality: Quality,
     #[command(flatten)]
     order: OrderArgs,
+    /// Add colliders, as gs4d collide does, simplified by at most this distance in cells (0.5 is usual).
+    #[arg(long, value_name = "CELLS", conflicts_with = "target_size", value_parser = values::up_to(4.0))]
+    colliders: Option<f32>,
+    /// A sound file (Ogg Vorbis or WAV) that the package carries: games play it beside the picture.
+    #[arg(long, value_name = "SOUND.ogg")]
+    audio: Option<PathBuf>,
+    /// Also write the package as chunk files, into the folder NAME.stream beside a package NAME.gs4d: for players that
+    /// stream it, as gs4d split does [default: on if the package has more than 6.25 MB and plays for more than two
+    /// seconds].
+    #[arg(long, value_name = "SWITCH", require_equals = true, num_args = 0..=1, default_missing_value = "on", value_parser = values::switch())]
+    stream: Option<bool>,
     /// Do not train the Gaussians that remain after pruning. By default they are trained if there is a GPU and the
     /// images of all training views exist.
     #[arg(long)]
@@ -167,11 +185,11 @@ pub(crate) struct Bake {
 struct JobArgs {
     /// Run nothing, and write the stages as jobs to this file: command, needs, inputs and outputs of each, and the jobs
     /// that it waits for.
-    #[arg(long, value_name = "PLAN.json", conflicts_with_all = ["only", "shard", "keep_work"])]
+    #[arg(long, value_name = "PLAN.json", conflicts_with_all = ["only", "shard", "keep_work", "stream"])]
     plan: Option<PathBuf>,
     /// Run only this stage, from the results in OUT.bake/, which is kept; other stages may run at the same time. The
     /// stage report also evaluates.
-    #[arg(long, value_name = "STAGE", conflicts_with = "keep_work", value_parser = values::one_of(&JOB_STAGES))]
+    #[arg(long, value_name = "STAGE", conflicts_with_all = ["keep_work", "stream"], value_parser = values::one_of(&JOB_STAGES))]
     only: Option<&'static str>,
     /// Compute only shard I of N, 0/N to N-1/N, of the stage score.
     #[arg(long, value_name = "I/N", requires = "only", conflicts_with = "shards")]
@@ -248,6 +266,12 @@ impl Bake {
         self.scoring.check(&self.given, &[self.variant])?;
         let (mut settings, progress) = (self.settings(self.package.out()?)?, &mut Bars::default());
         settings.check_files()?;
+        if self.stream == Some(true) {
+            let folder = chunk_folder(&settings.out);
+            Files::default().writes_folder(&folder, [folder.join(ChunkTable::INDEX)]).check()?;
+        }
+        // A sound that cannot be used is refused before anything is computed.
+        let sound = self.audio.as_deref().map(read_sound).transpose()?;
         let job = self.jobs.job(&self.given, self.is_dataset())?;
         if self.is_dataset() && !self.is_static && is_raw(&self.input) {
             if job.is_some() || self.jobs.plan.is_some() {
@@ -276,9 +300,59 @@ impl Bake {
             }
             return Ok(job_report(job));
         }
+        let seconds = scene.playback.duration_seconds;
+        let of_sound = sound.as_ref().map_or(0, |(file, _)| file.bytes().len() as u64);
+        if let Some((_, sound)) = &sound {
+            note_length(sound, seconds);
+        }
         let Baked { report, html, .. } = bake(scene, &settings, &mut { engine }, progress)?;
         report.warnings.iter().for_each(|warning| note(&format!("warning: {warning}")));
-        Ok(Report::new(report.json()?, in_short(&report, &html)))
+        let chunks = self.chunk_files(&settings.out, report.bytes.after.saturating_sub(of_sound), seconds, progress)?;
+        let (mut json, mut text) = (report.json()?, in_short(&report, &html));
+        if let Some(chunks) = chunks {
+            let Chunks { index, table, .. } = &chunks;
+            let length = table.files.iter().map(|file| file.bytes).sum::<u64>() + file_size(index)?;
+            json["chunks"] =
+                json!({ "index": index.display().to_string(), "files": table.files.len(), "bytes": length });
+            let what = format!("{}, {} files and the index, {}", index.display(), table.files.len(), bytes(length));
+            text.push_str(&lines(&[("chunk files", what)]));
+        }
+        Ok(Report::new(json, text))
+    }
+
+    /// Writes the chunk files of a package that has so many bytes without its sound and plays for `seconds`, if they are
+    /// wanted.
+    fn chunk_files(
+        &self,
+        package: &Path,
+        length: u64,
+        seconds: f32,
+        progress: &mut Bars,
+    ) -> Result<Option<Chunks>, Failure> {
+        match self.stream {
+            Some(true) => Ok(Some(write_chunk_files(package, progress)?)),
+            None if wants_chunk_files(length, seconds) => {
+                let folder = chunk_folder(package);
+                let (folder, length) = (folder.display(), bytes(length));
+                note(&format!("note: the package has {length}: {folder} has it in chunk files (--stream=off: none)"));
+                // The package is there: files that cannot be written do not fail the bake.
+                match write_chunk_files(package, progress).map_err(Failure::from) {
+                    Ok(chunks) => Ok(Some(chunks)),
+                    Err(failure) if failure.is_interruption() => Err(failure),
+                    Err(failure) => {
+                        note(&format!("warning: no chunk files: {}", failure.message()));
+                        Ok(None)
+                    }
+                }
+            }
+            Some(false) | None => {
+                let index = chunk_folder(package).join(ChunkTable::INDEX);
+                if index.exists() {
+                    note(&format!("note: {} is that of an earlier package: remove its folder", index.display()));
+                }
+                Ok(None)
+            }
+        }
     }
 
     /// Writes the bake as jobs.
@@ -417,6 +491,8 @@ impl Bake {
             quality: self.quality,
             order: self.order.order(),
             level: self.package.level,
+            colliders: self.colliders.map(|error| CollideSettings { error, ..CollideSettings::default() }),
+            audio: self.audio.clone(),
             trust_images: self.validation.trust_images,
             keep_work: self.keep_work,
         })

@@ -67,6 +67,8 @@ struct Facts {
     levels: Vec<LevelFacts>,
     sockets: Vec<SocketFacts>,
     colliders: Option<ColliderFacts>,
+    /// Bytes of the sound file.
+    sound: Option<usize>,
     /// Of the index of a capture in chunk files.
     chunks: Option<ChunkFacts>,
     /// Of packed Gaussians in the order of chunk files.
@@ -212,6 +214,7 @@ impl Info {
             "levels": facts.levels,
             "sockets": facts.sockets,
             "colliders": facts.colliders,
+            "sound": facts.sound.map(|bytes| json!({ "bytes": bytes })),
             "chunks": facts.chunks,
             "runs": facts.runs,
             "megabits_per_second": rate,
@@ -242,6 +245,7 @@ impl Facts {
                 let meshes = colliders.meshes().map(|mesh| [mesh.points.len(), mesh.triangles.len()]);
                 ColliderFacts::of_meshes(colliders.stretches.len(), meshes)
             }),
+            sound: scene.sound.as_ref().map(|sound| sound.bytes().len()),
             chunks: scene.chunks.as_deref().map(ChunkFacts::of),
             runs: match &scene.form {
                 SceneForm::Ready(Form::Packed(packed)) => packed.runs.as_ref().map(RunFacts::of),
@@ -278,6 +282,7 @@ impl Facts {
                 let meshes = iter::once(&colliders.standing).chain(moving).map(|mesh| [mesh.points, mesh.triangles]);
                 ColliderFacts::of_meshes(colliders.stretches.len(), meshes)
             }),
+            sound: header.sound,
             chunks: header.chunks.as_ref().map(ChunkFacts::of),
             runs: header.runs.as_ref().map(RunFacts::of),
         }
@@ -313,6 +318,9 @@ impl Facts {
         if let Some(ColliderFacts { stretches, points, triangles }) = &self.colliders {
             let what = format!("{points} points, {triangles} triangles, {stretches} stretches of time");
             pairs.push(("colliders", what));
+        }
+        if let Some(length) = self.sound {
+            pairs.push(("sound", format!("a file of {}", bytes(length as u64))));
         }
         if let Some(ChunkFacts { files, stretches, layers, gaussians, bytes: length, decibels_per_megabyte }) =
             &self.chunks

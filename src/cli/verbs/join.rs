@@ -72,6 +72,9 @@ impl Join {
         if segments.iter().any(|segment| segment.scene.colliders.is_some()) {
             note("note: colliders are left out: they have the times of one segment; gs4d collide makes new ones");
         }
+        if segments.iter().any(|segment| segment.scene.sound.is_some()) {
+            note("note: sounds are left out: each begins with its segment; gs4d sound puts one of the whole time in");
+        }
         let times = if self.keep_times { Times::Own } else { Times::Following };
         let Joined { scene, segments, is_exact } = join(segments, times, &mut Bars::default())?;
         if !is_exact {

@@ -25,6 +25,7 @@ pub(super) mod prune;
 pub(super) mod render;
 pub(super) mod score;
 pub(super) mod socket;
+pub(super) mod sound;
 pub(super) mod split;
 pub(super) mod synth;
 pub(super) mod train;

@@ -112,8 +112,8 @@ fn native<R: Read + Seek>(
     let trained_with = options::trained_with(options, cfg_args, &file);
     let playback = options::playback(options, &trained_with);
     let form = SceneForm::Trained(Trained { parameters, harmonics });
-    let (filter, levels, sockets, colliders, chunks) = Default::default();
-    Ok(GaussianScene { form, environment, filter, trained_with, playback, levels, sockets, colliders, chunks })
+    let (filter, levels, sockets, colliders, sound, chunks) = Default::default();
+    Ok(GaussianScene { form, environment, filter, trained_with, playback, levels, sockets, colliders, sound, chunks })
 }
 
 /// Reads the checkpoint with this path, and `cfg_args` in the same folder.

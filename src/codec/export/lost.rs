@@ -21,6 +21,9 @@ pub(crate) fn of(scene: &GaussianScene, format: &Export) -> Vec<String> {
     if scene.colliders.is_some() {
         lost.push("The colliders are not exported.".to_owned());
     }
+    if scene.sound.is_some() {
+        lost.push("The sound is not exported.".to_owned());
+    }
     if let Some(chunks) = &scene.chunks {
         lost.push(format!("The Gaussians in {} chunk files are not exported.", chunks.files.len()));
     }

@@ -98,6 +98,7 @@ impl Played {
             levels: Vec::new(),
             sockets: Vec::new(),
             colliders: None,
+            sound: None,
             chunks: None,
         };
         scene.check().map_err(ImportError::damaged)?;

@@ -11,7 +11,8 @@ use std::ops::Range;
 pub(super) struct Attribute {
     /// Name of its sections.
     pub name: &'static str,
-    /// Rows of the table: Gaussians, values of the environment map, points or triangles of colliders.
+    /// Rows of the table: Gaussians, values of the environment map, points or triangles of colliders, words of the
+    /// sound file.
     pub rows: usize,
     /// Number of words from one row to the next in memory.
     pub stride: usize,

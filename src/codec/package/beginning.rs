@@ -75,7 +75,8 @@ impl Beginning {
     }
 
     /// Returns a package of the layers up to this one, from the first bytes of the file. It has no temporal filter, no
-    /// environment map, sockets, colliders, chunk files or levels of detail. Its sections are checked when it is read.
+    /// environment map, sockets, colliders, sound, chunk files or levels of detail. Its sections are checked when it is
+    /// read.
     ///
     /// # Errors
     /// Layers that have not been received whole, or that do not exist; too little memory; a package that a reader would
@@ -121,6 +122,7 @@ fn plain(header: &Header, count: usize) -> Header {
         levels: Vec::new(),
         sockets: Vec::new(),
         colliders: None,
+        sound: None,
         chunks: None,
         sections: Vec::new(),
         requires: header

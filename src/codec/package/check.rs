@@ -12,7 +12,7 @@ use crate::gaussian::SMALLEST_CUTOFF;
 use crate::gaussian::harmonics::{MAX_COEFFICIENTS, evaluated};
 use crate::scene::detail::check_sizes;
 use crate::scene::packed::{MAX_ENTRIES, are_layers};
-use crate::scene::{ChunkTable, GaussianScene, MAX_LEVELS, MAX_SEGMENTS, SceneForm, Trained, check_sockets};
+use crate::scene::{ChunkTable, GaussianScene, MAX_LEVELS, MAX_SEGMENTS, SceneForm, SoundFile, Trained, check_sockets};
 
 /// Uncompressed bytes that a package of any length may hold.
 const RAW_FLOOR: u64 = 64 << 20;
@@ -154,6 +154,7 @@ impl Header {
         check_sizes(self.levels.iter().map(|level| level.pixels)).map_err(PackageError::Inconsistent)?;
         check_sockets(&self.sockets).map_err(PackageError::Inconsistent)?;
         self.colliders.as_ref().map_or(Ok(()), StoredColliders::check).map_err(PackageError::Inconsistent)?;
+        self.sound.map_or(Ok(()), SoundFile::check_length).map_err(PackageError::Inconsistent)?;
         self.chunks.as_ref().map_or(Ok(()), ChunkTable::check).map_err(PackageError::Inconsistent)?;
         sane(
             self.chunks.is_none() || (self.gaussians == 0 && self.levels.is_empty()),

@@ -63,6 +63,9 @@ pub struct Header {
     /// Meshes of the solid parts, without their points and triangles. Levels of detail have none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub colliders: Option<StoredColliders>,
+    /// Number of bytes of the sound file, if there is one. Levels of detail have none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sound: Option<usize>,
     /// The chunk files that have the Gaussians, if the package is the index of a capture in chunk files. Levels of detail
     /// have none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -214,6 +217,7 @@ impl Header {
             levels: scene.levels.iter().map(|level| StoredLevel { pixels: level.pixels }).collect(),
             sockets: scene.sockets.clone(),
             colliders: scene.colliders.as_deref().map(StoredColliders::of),
+            sound: scene.sound.as_ref().map(|sound| sound.len()),
             chunks: scene.chunks.as_deref().cloned(),
             sections: Vec::new(),
         }
@@ -319,6 +323,10 @@ impl Header {
             let table = |name, rows, width| Attribute { name, rows, stride: width, offset: 0, width };
             attributes.push(table("collider_points", points, 2));
             attributes.push(table("collider_triangles", triangles, 3));
+        }
+        if let Some(length) = self.sound {
+            let rows = length.div_ceil(4);
+            attributes.push(Attribute { name: "sound", rows, stride: 1, offset: 0, width: 1 });
         }
         attributes
     }

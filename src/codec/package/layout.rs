@@ -8,7 +8,7 @@ use super::header::{Header, StoredForm};
 use crate::gaussian::{Harmonics, Model, Parameters};
 use crate::scene::{
     ActiveSets, CodedColors, ColorCodebooks, Environment, Form, GaussianScene, PackedColors, PackedScene, SceneForm,
-    Sliced, TemporalFilter, Trained,
+    Sliced, SoundFile, TemporalFilter, Trained,
 };
 use bytemuck::{Zeroable, cast_slice, cast_slice_mut};
 use std::sync::Arc;
@@ -60,6 +60,7 @@ pub(super) fn empty(header: &Header) -> GaussianScene {
         levels: Vec::new(),
         sockets: header.sockets.clone(),
         colliders: None,
+        sound: header.sound.map(|length| Arc::new(SoundFile::blank(length))),
         chunks: header.chunks.clone().map(Arc::new),
     }
 }
@@ -119,6 +120,10 @@ pub(super) fn grow(scene: &mut GaussianScene, colliders: &mut ColliderWords, hea
         zeros.fill(&mut colliders.points, points);
         zeros.fill(&mut colliders.triangles, triangles);
     }
+    if let Some(sound) = &mut scene.sound {
+        let rows = sound.len().div_ceil(4);
+        zeros.fill(Arc::make_mut(sound).words_mut(), rows);
+    }
     zeros.complete
 }
 
@@ -151,6 +156,7 @@ pub(super) fn words<'a>(scene: &'a GaussianScene, colliders: &'a ColliderWords, 
     match name {
         "collider_points" => cast_slice(&colliders.points),
         "collider_triangles" => cast_slice(&colliders.triangles),
+        "sound" => scene.sound.as_ref().map(|sound| sound.words()).unwrap_or_default(),
         "filter" => match scene.filter.as_ref().map(|filter| &filter.sets) {
             Some(ActiveSets::Bits(words) | ActiveSets::Intervals(words)) => words,
             None => &[],
@@ -198,6 +204,10 @@ pub(super) fn words_mut<'a>(
     match name {
         "collider_points" => cast_slice_mut(&mut colliders.points),
         "collider_triangles" => cast_slice_mut(&mut colliders.triangles),
+        "sound" => match &mut scene.sound {
+            Some(sound) => Arc::make_mut(sound).words_mut(),
+            None => &mut [],
+        },
         "filter" => match scene.filter.as_mut().map(|filter| &mut filter.sets) {
             Some(ActiveSets::Bits(words) | ActiveSets::Intervals(words)) => words,
             None => &mut [],

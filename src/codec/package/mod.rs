@@ -7,8 +7,8 @@
 //! sections that the header lists. A section holds one attribute of a run of Gaussians, split into byte planes
 //! (`planes`), compressed and checksummed on its own. The order is geometry and first color coefficients, layer by layer
 //! so that a [`Beginning`] of the file can be drawn, the other coefficients, temporal filter, environment map,
-//! colliders, levels of detail, each of which is a package itself. A reader skips unknown sections, and refuses a
-//! package whose header requires an unknown feature.
+//! colliders, the sound, levels of detail, each of which is a package itself. A reader skips unknown sections, and
+//! refuses a package whose header requires an unknown feature.
 
 mod attribute;
 mod beginning;

@@ -24,8 +24,8 @@ pub struct Section {
     pub name: String,
     /// Encoding of the body: [`FLOAT_PLANES`] or [`PACKAGE`].
     pub encoding: String,
-    /// First row of the attribute: a Gaussian, a value of the environment map, a point or a triangle of colliders, or a
-    /// level of detail.
+    /// First row of the attribute: a Gaussian, a value of the environment map, a point or a triangle of colliders, a
+    /// word of the sound file, or a level of detail.
     pub first: usize,
     /// Number of rows.
     pub count: usize,

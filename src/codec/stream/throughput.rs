@@ -1,5 +1,5 @@
-//! Throughput: how fast files arrive, and how much earlier the most important Gaussians of later are loaded than the least
-//! important ones of now.
+//! Throughput: how fast files arrive, and how much earlier the most important Gaussians of later are loaded than the
+//! least important ones of now.
 //!
 //! In: in each frame, its length, whether files are on their way, the bytes of those that have arrived; how many bytes
 //! playing needs. Out: the seconds by which each layer may come later.
@@ -16,7 +16,8 @@ const FAST: f64 = 0.1;
 const FAST_FROM: f64 = 4.0;
 const SLOW_FROM: f64 = 1.5;
 
-/// The bytes of files that have arrived, and the seconds for which files were on their way, of the last few such seconds.
+/// The bytes of files that have arrived, and the seconds for which files were on their way, of the last few such
+/// seconds.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Throughput {
     bytes: f64,
@@ -25,8 +26,8 @@ pub struct Throughput {
 }
 
 impl Throughput {
-    /// Adds a frame: its length, whether files were on their way in it, the bytes of those that arrived, and how many bytes per
-    /// second playing needs ([`StreamSchedule::bytes_per_second`](super::StreamSchedule::bytes_per_second)).
+    /// Adds a frame: its length, whether files were on their way in it, the bytes of those that arrived, and how many
+    /// bytes per second playing needs ([`StreamSchedule::bytes_per_second`](super::StreamSchedule::bytes_per_second)).
     pub fn add(&mut self, seconds: f64, is_busy: bool, bytes: u64, needed: f64) {
         if is_busy {
             let kept = (-seconds / HALF_LIFE).exp2();
@@ -40,10 +41,11 @@ impl Throughput {
         }
     }
 
-    /// Returns [`StreamLimits::layer_seconds`] of a capture that has memory for what is ahead
-    /// ([`StreamSchedule::has_room`](super::StreamSchedule::has_room)).
-    pub fn layer_seconds(self) -> f64 {
-        if self.is_fast { FAST } else { StreamLimits::LAYER_SECONDS }
+    /// Returns [`StreamLimits::layer_seconds`] of a capture, given whether it has memory for what is ahead
+    /// ([`StreamSchedule::has_room`](super::StreamSchedule::has_room)): where memory is short, the first layer of what
+    /// is played next comes before the last layer of now, over every link.
+    pub fn layer_seconds(self, has_room: bool) -> f64 {
+        if self.is_fast && has_room { FAST } else { StreamLimits::LAYER_SECONDS }
     }
 }
 
@@ -59,7 +61,7 @@ mod tests {
             throughput.add(0.02, true, if frame % 5 == 4 { bytes } else { 0 }, needed);
             throughput.add(0.1, false, 0, needed);
         }
-        throughput.layer_seconds()
+        throughput.layer_seconds(true)
     }
 
     #[test]
@@ -82,16 +84,17 @@ mod tests {
     fn an_idle_link_is_as_fast_as_before_and_an_unknown_one_is_slow() {
         let mut unknown = Throughput::default();
         unknown.add(0.1, true, 1 << 30, 1.0);
-        assert_eq!(unknown.layer_seconds(), SLOW, "at the beginning");
+        assert_eq!(unknown.layer_seconds(true), SLOW, "at the beginning");
         let mut throughput = Throughput::default();
         play(&mut throughput, 100_000, 1e5);
         for _ in 0..1000 {
             throughput.add(1.0, false, 0, 1e5);
         }
-        assert_eq!(throughput.layer_seconds(), FAST, "after minutes without files");
+        assert_eq!(throughput.layer_seconds(true), FAST, "after minutes without files");
+        assert_eq!(throughput.layer_seconds(false), SLOW, "memory is short");
         let frames = (0..).take_while(|_| {
             throughput.add(0.02, true, 2000, 1e5);
-            throughput.layer_seconds() == FAST
+            throughput.layer_seconds(true) == FAST
         });
         let seconds = frames.count() as f64 * 0.02;
         assert!(seconds < 15.0, "a link of a tenth of the throughput is noticed: {seconds} s");

@@ -36,6 +36,6 @@ pub(crate) fn check_pictures(
     check(settings, &splits, &views, engine)?;
     // The smallest package has no Gaussians and no environment map.
     let one = synthesize(&SynthSettings { count: 1, ..SynthSettings::default() });
-    let scene = GaussianScene { trained_with, playback, ..one };
+    let scene = GaussianScene { trained_with, playback, sound: settings.sound()?, ..one };
     require_least(&scene, settings, key_frames(settings, &views), settings.fine_tune.is_some())
 }

@@ -5,6 +5,7 @@
 use crate::codec::CodecError;
 use crate::codec::package::PackageError;
 use crate::gaussian::InvalidGaussian;
+use crate::offline::collide::CollideError;
 use crate::offline::compress::CompressError;
 use crate::offline::dataset::DatasetError;
 use crate::offline::engine::EngineError;
@@ -14,6 +15,7 @@ use crate::offline::measure::MeasureError;
 use crate::offline::prune::PruneError;
 use crate::offline::report::ReportError;
 use crate::offline::score::ScoreError;
+use crate::offline::segments::SegmentsError;
 use crate::offline::store::StoreError;
 use crate::offline::store::shard::Shard;
 use crate::offline::train::TrainError;
@@ -77,6 +79,12 @@ pub enum BakeError {
     /// A package cannot be written.
     #[error("{0}")]
     Package(#[from] PackageError),
+    /// No colliders can be made.
+    #[error("colliders: {0}")]
+    Colliders(#[from] CollideError),
+    /// The package cannot be cut into chunk files.
+    #[error("{0}")]
+    Segments(#[from] SegmentsError),
     /// A capture cannot be read or written.
     #[error("{0}")]
     Codec(#[from] CodecError),

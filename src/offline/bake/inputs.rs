@@ -57,6 +57,7 @@ impl<'a> Inputs<'a> {
             Some(_) => Store::shared(&settings.out, BAKE_FOLDER)?,
             None => Store::beside(&settings.out, BAKE_FOLDER)?,
         };
+        scene.sound = settings.sound()?.or(scene.sound);
         require_no_windows(scene.filter.as_ref(), "a bake")?;
         scene.filter = None;
         scene.levels.clear();
@@ -67,6 +68,9 @@ impl<'a> Inputs<'a> {
         scene.trained_with.validation = Some(splits.to_string());
         let read = format!("{:?} {:?} {:?}", scene.trained_with, scene.playback, settings.background);
         let scene_key = Key::of_files(&[checkpoint])?.and(env!("CARGO_PKG_VERSION")).and(&read);
+        // How many Gaussians fit into a package of a given size depends on its other parts.
+        let sound = scene.sound.as_ref().filter(|_| matches!(settings.goal, Goal::Size(_)));
+        let scene_key = sound.map_or(scene_key, |sound| scene_key.with(Key::of(sound.bytes())));
         let cameras_key = Key::of(format!("{:?} {:?}", splits.train, splits.validation).as_bytes());
         let trained = Key::of_images(&splits.train, progress)?;
         let image_keys = [trained, Key::of_images(&splits.validation, progress)?];

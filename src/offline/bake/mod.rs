@@ -20,11 +20,13 @@
 //! | `rounds`, `tuning` | rounds and fine-tune: gradual pruning, and training the remaining Gaussians |
 //! | `compression`, `size`, `package_size` | mask and compress, and how many Gaussians fit into a package |
 //! | `test_comparison`, `summary` | evaluate and report |
+//! | `chunk_files` | the package in chunk files, once the bake has ended |
 //! | `job`, `plan` | single stages as jobs for many machines |
 
 mod ahead;
 mod before_training;
 mod choice;
+mod chunk_files;
 mod compression;
 mod error;
 mod inputs;
@@ -43,6 +45,7 @@ mod tuning;
 
 pub(crate) use ahead::obstacle_to_tuning;
 pub(crate) use before_training::check_pictures;
+pub use chunk_files::{chunk_folder, wants_chunk_files, write_chunk_files};
 pub use error::BakeError;
 pub use settings::BakeSettings;
 pub use train_stage::{train_dataset, trained_path};

@@ -205,6 +205,7 @@ impl Planner<'_> {
         if stage != "train" {
             inputs.insert(0, self.settings.checkpoint.clone());
         }
+        inputs.extend(self.settings.audio.clone());
         if stage != "train" && !after.is_empty() {
             inputs.push(self.folder());
         }

@@ -75,8 +75,8 @@ impl Attempts {
     }
 }
 
-/// Checks, before the scoring, that the parts of the package that do not depend on the kept Gaussians fit: the header
-/// and the environment map.
+/// Checks, before the scoring, that the parts of the package that do not depend on the kept Gaussians fit: the header,
+/// the environment map and the sound.
 ///
 /// # Errors
 /// These parts do not fit.
@@ -134,7 +134,7 @@ fn size_of(inputs: &Inputs<'_>, kept: &[u32]) -> Result<u64, BakeError> {
 
 /// Returns the error for a limit that no package meets; `found` describes the smallest package.
 fn too_small(settings: &BakeSettings, limit: u64, found: &str) -> FileError {
-    let remedy = "choose a lower quality or a larger size; a file that was here before has not changed";
+    let remedy = "choose a lower quality or a larger size, or no sound; a file that was here before has not changed";
     let reason = format!("this capture does not fit into {limit} bytes: {found}; {remedy}");
     FileError::at(&settings.out, reason)
 }

@@ -150,6 +150,7 @@ impl Maker<'_> {
             levels: Vec::new(),
             sockets: Vec::new(),
             colliders: None,
+            sound: None,
             chunks: None,
         }
     }

@@ -81,8 +81,9 @@ pub fn join(mut segments: Vec<Segment>, times: Times, progress: &mut dyn Progres
         count,
         sets: ActiveSets::Intervals(intervals),
     };
-    let (filter, (levels, sockets, colliders, chunks)) = (Some(filter), Default::default());
-    let scene = GaussianScene { form, environment, filter, trained_with, playback, levels, sockets, colliders, chunks };
+    let (filter, (levels, sockets, colliders, sound, chunks)) = (Some(filter), Default::default());
+    let scene =
+        GaussianScene { form, environment, filter, trained_with, playback, levels, sockets, colliders, sound, chunks };
     Ok(Joined { scene, segments, is_exact: grid.is_exact })
 }
 

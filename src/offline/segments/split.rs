@@ -136,11 +136,15 @@ impl Split {
         for (part, path) in self.parts.iter().zip(self.paths(folder)) {
             proceed(progress)?;
             let mut scene = segment.scene.select(&part.gaussians);
-            // All chunks have one environment map, and the same sockets and colliders, in the first file.
+            // All chunks have one environment map, and the same sockets and colliders, in the first file. The sound is in
+            // the last, for `join` alone: it would delay the first picture.
             scene.environment = scene.environment.filter(|_| files.is_empty());
             if !files.is_empty() {
                 scene.sockets.clear();
                 scene.colliders = None;
+            }
+            if files.len() + 1 < self.parts.len() {
+                scene.sound = None;
             }
             save_chunk(&path, &scene, &settings)?;
             let bytes = fs::metadata(&path).map_err(|error| FileError::at(&path, error))?.len();
@@ -158,7 +162,7 @@ impl Split {
             utilities: utilities(psnrs, files_of()),
         };
         let chunks = Some(Arc::new(table.clone()));
-        let scene = GaussianScene { filter: None, chunks, ..segment.scene.select(&[]) };
+        let scene = GaussianScene { filter: None, sound: None, chunks, ..segment.scene.select(&[]) };
         save(&index, &scene, &settings)?;
         progress.advance();
         progress.finish();
@@ -204,7 +208,7 @@ mod tests {
     use crate::offline::work::NoProgress;
     use crate::offline::work::progress::InterruptedProgress;
     use crate::scene::synth::{SynthSettings, synthesize};
-    use crate::scene::{Colliders, Environment};
+    use crate::scene::{Colliders, Environment, SoundFile};
 
     const COUNT: usize = 6000;
 
@@ -216,6 +220,7 @@ mod tests {
     fn whole() -> Segment {
         let mut scene = synthesize(&SynthSettings { count: COUNT, ..SynthSettings::default() });
         scene.colliders = Some(Arc::default());
+        scene.sound = Some(Arc::new(SoundFile::new(b"a song").expect("a file has bytes")));
         Segment { path: PathBuf::from("whole.gs4d"), scene }
     }
 
@@ -244,6 +249,7 @@ mod tests {
                     let [first, last] = chunk.times;
                     let own = read(file);
                     assert_eq!(own.scene.colliders.is_some(), *file == files[0], "the first file has the colliders");
+                    assert_eq!(own.scene.sound.is_some(), Some(file) == files.last(), "the last file has the sound");
                     let cutoff = own.scene.trained_with.marginal_cutoff;
                     for gaussian in own.scene.gaussians().expect("every Gaussian can be drawn").iter() {
                         let is_drawn = |time: f64| gaussian.marginal(time as f32) > cutoff;
@@ -254,6 +260,7 @@ mod tests {
                 let united = unite(files.iter().map(|file| read(file)).collect(), &mut NoProgress);
                 whole.scene = united.expect("chunks of one capture");
                 assert!(whole.scene.colliders.is_some(), "the whole capture has the colliders");
+                assert!(whole.scene.sound.is_some(), "the whole capture has the sound");
                 let written = files.iter().chain([&chunks.index]);
                 let bytes: Vec<Vec<u8>> = written.map(|file| fs::read(file).expect("it was written")).collect();
                 assert!(round == 0 || bytes == before, "the chunks of united chunks are the same files");
@@ -326,6 +333,7 @@ mod tests {
         assert_eq!(index.form.color_degrees(), whole.scene.form.color_degrees(), "the color of the whole");
         assert_eq!(index.environment, whole.scene.environment, "the environment map");
         assert_eq!(index.colliders.as_deref(), Some(&Colliders::default().rounded()), "the colliders");
+        assert!(index.sound.is_none(), "the sound would delay the first picture");
         assert_eq!((index.trained_with, index.playback), (whole.scene.trained_with, whole.scene.playback), "settings");
     }
 

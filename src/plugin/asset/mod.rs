@@ -30,6 +30,8 @@ mod pause;
 mod plugin;
 mod processor;
 mod saver;
+#[cfg(feature = "sound")]
+mod sound_loader;
 mod state;
 mod systems;
 mod uploads;
@@ -45,5 +47,7 @@ pub use processor::{
     CaptureProcessor, CaptureTransformError, CaptureTransformer, CaptureTransformerSettings, ProcessedForm,
 };
 pub use saver::{CaptureSaveError, PackageSaver, PackageSaverSettings};
+#[cfg(feature = "sound")]
+pub use sound_loader::{SoundLoadError, SoundLoader};
 pub use state::{CaptureAssetSystems, CaptureState};
 pub(crate) use uploads::Uploads;

@@ -6,10 +6,12 @@
 use super::loader::CaptureLoader;
 use super::messages::{CaptureFailed, CaptureReady};
 use super::processor;
+#[cfg(feature = "sound")]
+use super::sound_loader::SoundLoader;
 use super::state::{CaptureAssetSystems, CaptureState};
 use super::systems::{any_upload_failure, report_upload_failures, update_states};
 use super::uploads::Uploads;
-use crate::plugin::component::{GaussianCapture, GaussianCapture3d, Upright, stand_upright};
+use crate::plugin::component::{GaussianCapture, GaussianCapture3d, SoundTrack, Upright, stand_upright};
 use bevy::app::{App, Plugin, PostUpdate, PreUpdate};
 use bevy::asset::{AssetApp, AssetServer, AssetTrackingSystems};
 use bevy::ecs::schedule::IntoScheduleConfigs;
@@ -51,6 +53,7 @@ impl Plugin for CaptureAssetPlugin {
 
 fn add(app: &mut App) {
     app.init_asset::<GaussianCapture>()
+        .init_asset::<SoundTrack>()
         .init_resource::<Uploads>()
         .register_required_components::<GaussianCapture3d, CaptureState>()
         .init_asset_loader::<CaptureLoader>()
@@ -68,5 +71,7 @@ fn add(app: &mut App) {
             stand_upright.run_if(any_with_component::<Upright>).before(TransformSystems::Propagate),
         )
         .add_systems(PreUpdate, report_upload_failures.run_if(any_upload_failure).after(CaptureAssetSystems));
+    #[cfg(feature = "sound")]
+    app.init_asset_loader::<SoundLoader>();
     processor::register(app);
 }

@@ -216,6 +216,7 @@ fn outline(scene: &RuntimeScene) -> RuntimeScene {
         levels: scene.levels.iter().map(level).collect(),
         sockets: scene.sockets.clone(),
         colliders: scene.colliders.clone(),
+        sound: scene.sound.clone(),
         chunks: scene.chunks.clone(),
         ..RuntimeScene::sliced(Vec::new(), Harmonics::default())
     }

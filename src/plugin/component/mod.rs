@@ -9,6 +9,7 @@ mod capture_3d;
 mod edited;
 mod key_frames;
 mod picture;
+mod sound_track;
 mod upright;
 
 pub use capture::GaussianCapture;
@@ -16,5 +17,6 @@ pub use capture_3d::GaussianCapture3d;
 pub use edited::CaptureEditError;
 pub use key_frames::KeyFrames;
 pub(crate) use picture::StreamedPicture;
+pub use sound_track::SoundTrack;
 pub(crate) use upright::stand_upright;
 pub use upright::{Upright, UprightTurn};

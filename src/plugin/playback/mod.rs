@@ -55,8 +55,10 @@ pub(crate) use plugin::require_playback;
 pub use repeat::Repeat;
 pub use socket::{CaptureSocket, SocketState};
 pub(crate) use stall::Stall;
+pub(crate) use state::PlaybackState;
 pub use systems::PlaybackSystems;
 pub use timeline::{
-    Clip, ClipFade, InvalidTimeline, Timeline, TimelineError, TimelineLoader, TimelinePlayer, TimelineTrack, Track,
+    Clip, ClipFade, InvalidTimeline, SoundClip, Timeline, TimelineError, TimelineLoader, TimelinePlayer, TimelineTrack,
+    Track,
 };
 pub(crate) use timeline::{Cue, NextClip};

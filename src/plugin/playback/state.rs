@@ -9,7 +9,7 @@ use bevy::ecs::entity::Entity;
 
 /// The state of a [`Playback`](super::Playback) after the last step. Default: before the first step.
 #[derive(Component, Debug, Default, Clone)]
-pub(super) struct PlaybackState {
+pub(crate) struct PlaybackState {
     /// The played capture or timeline; `None` before the first step.
     pub(super) asset: Option<UntypedAssetId>,
     /// The reached phase, without the rounding of [`Playback::time`](super::Playback::time).
@@ -55,6 +55,11 @@ impl PlaybackState {
         }
     }
 
+    /// Returns the number of jumps so far: seeks, and wraps of a loop.
+    pub(crate) fn jumps(&self) -> u32 {
+        self.jumps
+    }
+
     /// Returns whether no time has been played since the first step or the last seek.
     pub(super) fn is_unplayed(&self) -> bool {
         self.span.is_none() || self.fresh
@@ -62,7 +67,7 @@ impl PlaybackState {
 
     /// Returns the time, in seconds since the capture's start, without the rounding of
     /// [`Playback::time`](super::Playback::time).
-    pub(super) fn seconds(&self) -> f64 {
+    pub(crate) fn seconds(&self) -> f64 {
         match self.span {
             // Only a seek leads to the end of a loop: playback wraps there.
             Some(span) if self.is_at_end(&span) => span.end(),

@@ -315,11 +315,8 @@ pub(super) fn fetch_files(
         let gpu_bytes = (budget.gpu_bytes as f64 * *share) as u64;
         uploads.grant(*id, gpu_bytes);
         stream.share = gpu_bytes;
-        // Where memory is short, the first layer of what is played next comes before the last layer of now.
-        let layer_seconds = match stream.schedule.has_room(gpu_bytes, budget.ahead_seconds.into()) {
-            true => throughput.layer_seconds(),
-            false => StreamLimits::LAYER_SECONDS,
-        };
+        let has_room = stream.schedule.has_room(gpu_bytes, budget.ahead_seconds.into());
+        let layer_seconds = throughput.layer_seconds(has_room);
         // Pages may lack the memory to grow.
         let gpu_bytes = uploads.paged(*id).map_or(gpu_bytes, |bytes| bytes.min(gpu_bytes));
         let ahead = budget.ahead_seconds.into();

@@ -32,6 +32,7 @@ const PLUGIN: &Order = &[
     ("asset", &["component"]),
     ("playback", &["component", "asset"]),
     ("render", &["component", "asset", "playback"]),
+    ("sound", &["component", "asset", "playback"]),
     ("stream", &["component", "asset", "playback", "render"]),
     ("picker", &["component", "asset", "playback", "render"]),
     ("pbr", &["component", "asset", "playback", "render", "stream"]),

@@ -70,6 +70,8 @@ impl Saved {
             quality: Quality::VisuallyLossless,
             order: PackedOrder::Spatial,
             level: Some(1),
+            colliders: None,
+            audio: None,
             trust_images: false,
             keep_work: true,
         };

@@ -137,6 +137,7 @@ pub fn begin(
         levels: Vec::new(),
         sockets: Vec::new(),
         colliders: None,
+        sound: None,
         chunks: None,
     };
     Ok((scene, start))

@@ -1,9 +1,10 @@
-//! The timeline in memory: tracks of clips, and markers.
+//! The timeline in memory: tracks of clips, markers, and sounds.
 //!
-//! In: tracks and markers, in any order. Out: a valid [`Timeline`], sorted by time, or an [`InvalidTimeline`].
+//! In: tracks, markers and sounds, in any order. Out: a valid [`Timeline`], sorted by time, or an [`InvalidTimeline`].
 
 use super::clip::{Clip, TOUCH, is_time};
 use super::error::InvalidTimeline;
+use super::sound_clip::SoundClip;
 use crate::plugin::playback::markers::Marker;
 use bevy::asset::{Asset, VisitAssetDependencies};
 use bevy::reflect::TypePath;
@@ -31,6 +32,8 @@ pub struct Timeline {
     #[dependency]
     tracks: Vec<Track>,
     markers: Vec<Marker>,
+    #[dependency]
+    sounds: Vec<SoundClip>,
     duration: f32,
 }
 
@@ -79,7 +82,16 @@ impl Timeline {
         if duration <= 0.0 && markers.is_empty() {
             return Err(InvalidTimeline::Empty);
         }
-        Ok(Self { tracks, markers, duration })
+        Ok(Self { tracks, markers, sounds: Vec::new(), duration })
+    }
+
+    /// Returns the timeline with these sounds in place of its own. They do not make it longer.
+    ///
+    /// # Errors
+    /// The first sound with an invalid number.
+    pub fn with_sounds(self, sounds: Vec<SoundClip>) -> Result<Self, InvalidTimeline> {
+        sounds.iter().enumerate().try_for_each(|(index, sound)| sound.check(index + 1))?;
+        Ok(Self { sounds, ..self })
     }
 
     /// Returns the tracks, each with its clips in order of time.
@@ -90,6 +102,11 @@ impl Timeline {
     /// Returns the markers, in order of time.
     pub fn markers(&self) -> &[Marker] {
         &self.markers
+    }
+
+    /// Returns the sounds, in the order in which they were given.
+    pub fn sounds(&self) -> &[SoundClip] {
+        &self.sounds
     }
 
     /// Returns the duration of the timeline in seconds.
@@ -189,6 +206,30 @@ mod tests {
             assert!(shown(time), "a clip is shown at {time} s");
         }
         assert!(!shown(3.005), "no clip is shown in an intended gap");
+    }
+
+    #[test]
+    fn sounds_are_checked_and_do_not_lengthen_the_timeline() {
+        let timeline = || Timeline::new(vec![track("left", vec![clip(0.0, [0.0, 1.0], 1.0)])], Vec::new(), None);
+        let timeline = || timeline().expect("the timeline is valid");
+        let sound = SoundClip { sound: Handle::default(), start: 5.0, volume: 0.5 };
+        let with = timeline().with_sounds(vec![sound.clone()]).expect("the sound is valid");
+        assert_eq!(
+            (with.sounds().len(), with.duration_seconds()),
+            (1, 1.0),
+            "the sound is there, and the duration stays"
+        );
+        let cases = [
+            (SoundClip { start: -1.0, ..sound.clone() }, "sound 2: start is -1"),
+            (SoundClip { start: f32::NAN, ..sound.clone() }, "sound 2: start is NaN"),
+            (SoundClip { volume: 1.5, ..sound.clone() }, "sound 2: volume is 1.5"),
+            (SoundClip { volume: f32::NAN, ..sound.clone() }, "sound 2: volume is NaN"),
+        ];
+        for (bad, expected) in cases {
+            let message =
+                timeline().with_sounds(vec![sound.clone(), bad]).expect_err("the sound is invalid").to_string();
+            assert!(message.starts_with(expected), "{message} begins with {expected}");
+        }
     }
 
     #[test]

@@ -60,6 +60,18 @@ pub enum InvalidTimeline {
         /// The start of the second clip, in seconds of the timeline.
         start: f32,
     },
+    /// A number of a sound is out of its range.
+    #[error("sound {sound}: {field} is {value}, but must be {must}")]
+    SoundNumber {
+        /// The number of the sound.
+        sound: usize,
+        /// The field's name, as in files.
+        field: &'static str,
+        /// The field's value.
+        value: f32,
+        /// The condition on the value.
+        must: &'static str,
+    },
     /// A marker's time is out of its range.
     #[error("marker {marker} ({name:?}): time is {time}, but must be 0 or later, in seconds")]
     MarkerTime {

@@ -1,12 +1,13 @@
 //! The timeline as a file.
 //!
 //! In: the text of a `*.timeline.ron`, in the format that the [module](super) describes. Out: a [`Timeline`] whose
-//! captures have begun to load, or a [`TimelineError`], to which Bevy adds the path.
+//! captures and sounds have begun to load, or a [`TimelineError`], to which Bevy adds the path.
 
 use super::asset::{Timeline, Track};
 use super::clip::Clip;
 use super::error::InvalidTimeline;
-use crate::plugin::component::GaussianCapture;
+use super::sound_clip::SoundClip;
+use crate::plugin::component::{GaussianCapture, SoundTrack};
 use crate::plugin::playback::markers::Marker;
 use bevy::asset::io::Reader;
 use bevy::asset::{AssetLoader, AssetPath, Handle, LoadContext, ParseAssetPathError};
@@ -24,18 +25,16 @@ pub enum TimelineError {
     /// The text is not a timeline. The message names the line and the column.
     #[error("not a timeline, at line and column {0}")]
     Syntax(#[from] ron::error::SpannedError),
-    /// A capture's path cannot be parsed.
-    #[error("capture {path:?}: {reason}")]
+    /// The path of a capture or of a sound cannot be parsed.
+    #[error("file {path:?}: {reason}")]
     Path {
         /// The path, as written.
         path: String,
         /// The fault of the path.
         reason: ParseAssetPathError,
     },
-    /// A capture's path is empty, absolute, or leads out of the asset folder.
-    #[error(
-        "capture {path:?} is not in the asset folder; write a path relative to that folder, such as \"toybox.gs4d\""
-    )]
+    /// The path of a capture or of a sound is empty, absolute, or leads out of the asset folder.
+    #[error("file {path:?} is not in the asset folder; write a path relative to that folder, such as \"toybox.gs4d\"")]
     Outside {
         /// The path, as written.
         path: String,
@@ -63,7 +62,13 @@ impl AssetLoader for TimelineLoader {
     ) -> Result<Timeline, TimelineError> {
         let mut bytes = Vec::new();
         reader.read_to_end(&mut bytes).await?;
-        read(&bytes, |path| context.load(path))
+        let (timeline, sounds) = read(&bytes, |path| context.load(path))?;
+        let sounds = sounds.into_iter().map(|SoundFile { file, start, volume }| {
+            let sound: Handle<SoundTrack> = context.load(asset_path(&file)?);
+            Ok::<_, TimelineError>(SoundClip { sound, start, volume })
+        });
+        let sounds = sounds.collect::<Result<_, _>>()?;
+        Ok(timeline.with_sounds(sounds)?)
     }
 
     fn extensions(&self) -> &[&str] {
@@ -78,6 +83,8 @@ struct TimelineFile {
     tracks: Vec<TrackFile>,
     #[serde(default)]
     markers: Vec<MarkerFile>,
+    #[serde(default)]
+    sounds: Vec<SoundFile>,
     #[serde(default)]
     duration: Option<f32>,
 }
@@ -113,15 +120,30 @@ struct MarkerFile {
     name: String,
 }
 
+#[derive(Debug, Deserialize)]
+#[serde(rename = "Sound", deny_unknown_fields)]
+struct SoundFile {
+    file: String,
+    #[serde(default)]
+    start: f32,
+    #[serde(default = "full_volume")]
+    volume: f32,
+}
+
 fn normal_speed() -> f32 {
     1.0
 }
 
-/// Parses the text of a file. `load` returns the handle of a capture.
+fn full_volume() -> f32 {
+    1.0
+}
+
+/// Parses the text of a file. `load` returns the handle of a capture. Returns the timeline without its sounds, and
+/// these.
 fn read(
     bytes: &[u8],
     mut load: impl FnMut(AssetPath<'static>) -> Handle<GaussianCapture>,
-) -> Result<Timeline, TimelineError> {
+) -> Result<(Timeline, Vec<SoundFile>), TimelineError> {
     let options = ron::Options::default().with_default_extension(Extensions::IMPLICIT_SOME);
     let file: TimelineFile = options.from_bytes(bytes)?;
     let mut tracks = Vec::new();
@@ -139,10 +161,11 @@ fn read(
         tracks.push(track);
     }
     let markers = file.markers.into_iter().map(|MarkerFile { time, name }| Marker { time, name }).collect();
-    Ok(Timeline::new(tracks, markers, file.duration)?)
+    Ok((Timeline::new(tracks, markers, file.duration)?, file.sounds))
 }
 
-/// Parses the path of a capture. Rejects paths that lead out of the asset folder, at which Bevy would panic.
+/// Parses the path of a capture or of a sound. Rejects paths that lead out of the asset folder, at which Bevy would
+/// panic.
 fn asset_path(path: &str) -> Result<AssetPath<'static>, TimelineError> {
     let parsed = AssetPath::try_parse(path).map_err(|reason| TimelineError::Path { path: path.to_owned(), reason })?;
     if parsed.path().as_os_str().is_empty() || parsed.is_unapproved() {
@@ -156,7 +179,7 @@ mod tests {
     use super::*;
 
     fn read_text(text: &str) -> Result<Timeline, TimelineError> {
-        read(text.as_bytes(), |_| Handle::default())
+        read(text.as_bytes(), |_| Handle::default()).map(|(timeline, _)| timeline)
     }
 
     #[test]
@@ -169,10 +192,11 @@ mod tests {
                 ]),
             ],
             markers: [(time: 2.0, name: "cut")],
+            sounds: [(file: "song.ogg"), (file: "bang.wav", start: 2.5, volume: 0.25)],
             duration: 10.0,
         )"#;
         let mut loaded = Vec::new();
-        let timeline = read(text.as_bytes(), |path| {
+        let (timeline, sounds) = read(text.as_bytes(), |path| {
             loaded.push(path.to_string());
             Handle::default()
         })
@@ -190,6 +214,8 @@ mod tests {
             "given fields are read"
         );
         assert_eq!(timeline.markers(), [Marker { time: 2.0, name: "cut".into() }], "the marker is read");
+        let sounds: Vec<_> = sounds.iter().map(|sound| (sound.file.as_str(), sound.start, sound.volume)).collect();
+        assert_eq!(sounds, [("song.ogg", 0.0, 1.0), ("bang.wav", 2.5, 0.25)], "the sounds are read");
         assert_eq!(timeline.duration_seconds(), 10.0, "the duration is read");
     }
 

@@ -1,7 +1,8 @@
 //! Timelines: the times at which captures play.
 //!
 //! In: a file named `*.timeline.ron`, or a [`Timeline`] created in code, on a [`TimelinePlayer`]. Out: an entity for
-//! each track, whose capture, playback, fade and visibility follow the player; and a message for every reached marker.
+//! each track, whose capture, playback, fade and visibility follow the player; a message for every reached marker;
+//! sounds for the part [`sound`](crate::sound).
 //!
 //! ```ron
 //! (
@@ -14,12 +15,15 @@
 //!         ]),
 //!     ],
 //!     markers: [(time: 2.0, name: "cut")],
+//!     // Ogg Vorbis or WAV.
+//!     sounds: [(file: "song.ogg", start: 0.5, volume: 0.8)],
 //! )
 //! ```
 //!
 //! Paths are paths of `AssetServer::load`. `in` and `out` are seconds of the capture, `start` and `time` of the
-//! timeline. A clip lasts `(out - in) / |speed|`; the clips of a track may touch but not overlap: to cross-fade, use
-//! two tracks. The timeline lasts until its last clip or marker; `duration: 10.0` makes it longer.
+//! timeline. `start` and `volume` of a sound are 0 and 1 if left out. A clip lasts `(out - in) / |speed|`; the clips of
+//! a track may touch but not overlap: to cross-fade, use two tracks. The timeline lasts until its last clip or marker;
+//! `duration: 10.0` makes it longer.
 
 mod asset;
 mod clip;
@@ -27,6 +31,7 @@ mod error;
 mod file;
 mod next;
 mod player;
+mod sound_clip;
 mod systems;
 
 pub use asset::{Timeline, Track};
@@ -35,4 +40,5 @@ pub use error::InvalidTimeline;
 pub use file::{TimelineError, TimelineLoader};
 pub(crate) use next::{Cue, NextClip};
 pub use player::{ClipFade, TimelinePlayer, TimelineTrack};
+pub use sound_clip::SoundClip;
 pub(super) use systems::{advance_timelines, bind_tracks, update_tracks};

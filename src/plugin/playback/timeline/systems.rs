@@ -14,7 +14,7 @@ use crate::plugin::playback::component::Playback;
 use crate::plugin::playback::drive::{Following, Shown};
 use crate::plugin::playback::messages::Announcer;
 use crate::plugin::playback::state::PlaybackState;
-use bevy::asset::{AssetServer, Assets, LoadState};
+use bevy::asset::{AssetServer, Assets, LoadState, UntypedAssetId};
 use bevy::camera::visibility::Visibility;
 use bevy::ecs::change_detection::{DetectChangesMut, Mut};
 use bevy::ecs::entity::Entity;
@@ -81,7 +81,9 @@ pub(in crate::plugin::playback) fn advance_timelines(
         let Ok((entity, handle, mut playback, mut kept, mut clock)) = players.get_mut(player) else { continue };
         let Some(timeline) = timelines.get(&handle.0) else { continue };
         let mut clips = timeline.tracks().iter().flat_map(|track| &track.clips);
-        let awaited = state.is_unplayed() && clips.any(|clip| awaits(clip, &captures, &uploads, &server));
+        let awaited = state.is_unplayed()
+            && (clips.any(|clip| awaits(clip, &captures, &uploads, &server))
+                || timeline.sounds().iter().any(|clip| loads(clip.sound.id(), &server)));
         let jumps = state.jumps;
         let (next, progress) = state.advance(*playback, drive.unless(awaited), timeline.duration_seconds());
         playback.set_if_neq(next);
@@ -103,6 +105,11 @@ fn awaits(clip: &Clip, captures: &Assets<GaussianCapture>, uploads: &Uploads, se
     if captures.contains(id) {
         return uploads.awaits(id);
     }
+    loads(id, server)
+}
+
+/// Returns whether an asset is being loaded.
+fn loads(id: impl Into<UntypedAssetId>, server: &AssetServer) -> bool {
     matches!(server.get_load_state(id), Some(LoadState::NotLoaded | LoadState::Loading))
 }
 

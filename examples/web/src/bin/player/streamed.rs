@@ -141,10 +141,7 @@ impl Streamed {
         let passed = (now - self.planned).clamp(0.0, LONGEST_FRAME);
         (self.planned, self.now) = (now, self.now + passed);
         self.throughput.add(passed, is_busy, std::mem::take(&mut self.arrived), needed);
-        let layer_seconds = match self.schedule.has_room(GPU_BYTES, AHEAD) {
-            true => self.throughput.layer_seconds(),
-            false => StreamLimits::LAYER_SECONDS,
-        };
+        let layer_seconds = self.throughput.layer_seconds(self.schedule.has_room(GPU_BYTES, AHEAD));
         let limits = StreamLimits {
             gpu_bytes: GPU_BYTES,
             host_bytes: HOST_BYTES,
