@@ -29,7 +29,7 @@ FILM=${FILM:-$built/examples/film}
 GS4D=$(realpath "${GS4D:-$built/gs4d}")
 read -ra adapters <<<"${ADAPTERS:-0}"
 read -ra bake <<<"${BAKE:---gaussians 60000 --train-steps 8000 --quality lossless}"
-read -ra cut <<<"${CUT:---chunk 1 --layers 5,20,25,50 --verify 0}"
+read -ra cut <<<"${CUT:---chunk 1 --layers 5,20,25,50 --codebooks 512,512 --verify 0}"
 film=(--take "$length" --cameras 24 --times "$((10 * seconds))" --size 400 "$@")
 
 mkdir -p "$folder/bin" "$folder/plans"
