@@ -82,7 +82,24 @@ fn a_bake_adds_a_sound_and_colliders_and_writes_chunk_files() {
     gs4d(&arguments!["join", capture.path("out.stream"), "-o", &joined]).text();
     let count = |path: &Path| gs4d(&arguments!["info", path, "--json"]).json()["gaussians"].as_u64();
     assert!(count(&joined) >= Some(1500), "every Gaussian is in the chunk files: {:?}", count(&joined));
-    assert_eq!(carried(&joined).as_deref(), Some(TONE), "the sound is in the first of them");
+    assert_eq!(carried(&joined).as_deref(), Some(TONE), "the sound is beside them");
+    assert_eq!(
+        fs::read(capture.path("out.stream/index.ogg")).ok().as_deref(),
+        Some(TONE),
+        "under the name of the index"
+    );
+    // Chunk files of an earlier package are replaced by --stream alone, and never if the input is among them.
+    let chunks = || contents(&capture.path("out.stream"));
+    let before = chunks();
+    let quiet = gs4d(&[fixed.to_vec(), arguments!["--keep", "1000", "--keep-work"].to_vec()].concat());
+    assert!(quiet.err.contains("is that of an earlier package: --stream replaces"), "a note: {}", quiet.err);
+    assert_eq!(chunks(), before, "they stay");
+    with(&["--keep-work", "--stream"]);
+    assert_ne!(chunks(), before, "--stream replaces them");
+    let first = capture.path("out.stream").join(format!("chunk-00001-of-{files:05}.gs4d"));
+    assert!(!capture.path("out.stream/index.ogg").exists(), "the sound of the earlier package is gone");
+    let inside = arguments!["bake", &first, "--data", &capture.data, "-o", &out, "--engine", "cpu", "--stream"];
+    gs4d(&inside).must_fail("would be replaced by the chunk files: name another OUT");
 }
 
 #[test]

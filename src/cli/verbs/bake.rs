@@ -269,6 +269,10 @@ impl Bake {
         if self.stream == Some(true) {
             let folder = chunk_folder(&settings.out);
             Files::default().writes_folder(&folder, [folder.join(ChunkTable::INDEX)]).check()?;
+            let input = self.input.canonicalize().ok();
+            if folder.canonicalize().is_ok_and(|folder| input.is_some_and(|input| input.starts_with(folder))) {
+                return Err(Failure::about(&self.input, "would be replaced by the chunk files: name another OUT"));
+            }
         }
         // A sound that cannot be used is refused before anything is computed.
         let sound = self.audio.as_deref().map(read_sound).transpose()?;
@@ -301,13 +305,14 @@ impl Bake {
             return Ok(job_report(job));
         }
         let seconds = scene.playback.duration_seconds;
-        let of_sound = sound.as_ref().map_or(0, |(file, _)| file.bytes().len() as u64);
+        let own = sound.as_ref().map(|(file, _)| file).or(scene.sound.as_deref());
+        let of_sound = own.map_or(0, |file| file.bytes().len() as u64);
         if let Some((_, sound)) = &sound {
             note_length(sound, seconds);
         }
         let Baked { report, html, .. } = bake(scene, &settings, &mut { engine }, progress)?;
         report.warnings.iter().for_each(|warning| note(&format!("warning: {warning}")));
-        let chunks = self.chunk_files(&settings.out, report.bytes.after.saturating_sub(of_sound), seconds, progress)?;
+        let chunks = self.chunk_files(&settings.out, [report.bytes.after, of_sound], seconds, progress)?;
         let (mut json, mut text) = (report.json()?, in_short(&report, &html));
         if let Some(chunks) = chunks {
             let Chunks { index, table, .. } = &chunks;
@@ -320,19 +325,20 @@ impl Bake {
         Ok(Report::new(json, text))
     }
 
-    /// Writes the chunk files of a package that has so many bytes without its sound and plays for `seconds`, if they are
-    /// wanted.
+    /// Writes the chunk files of a package that plays for `seconds`, if they are wanted: by `--stream`, or because it is
+    /// large and there are none of an earlier package. `lengths`: the bytes of the package, and of its sound.
     fn chunk_files(
         &self,
         package: &Path,
-        length: u64,
+        lengths: [u64; 2],
         seconds: f32,
         progress: &mut Bars,
     ) -> Result<Option<Chunks>, Failure> {
+        let (folder, [length, of_sound]) = (chunk_folder(package), lengths);
         match self.stream {
             Some(true) => Ok(Some(write_chunk_files(package, progress)?)),
-            None if wants_chunk_files(length, seconds) => {
-                let folder = chunk_folder(package);
+            // Nothing is replaced that the command does not name.
+            None if wants_chunk_files(length.saturating_sub(of_sound), seconds) && !folder.exists() => {
                 let (folder, length) = (folder.display(), bytes(length));
                 note(&format!("note: the package has {length}: {folder} has it in chunk files (--stream=off: none)"));
                 // The package is there: files that cannot be written do not fail the bake.
@@ -346,9 +352,10 @@ impl Bake {
                 }
             }
             Some(false) | None => {
-                let index = chunk_folder(package).join(ChunkTable::INDEX);
+                let index = folder.join(ChunkTable::INDEX);
                 if index.exists() {
-                    note(&format!("note: {} is that of an earlier package: remove its folder", index.display()));
+                    let index = index.display();
+                    note(&format!("note: {index} is that of an earlier package: --stream replaces its files"));
                 }
                 Ok(None)
             }

@@ -9,7 +9,7 @@ use crate::cli::output::note::note;
 use crate::cli::output::progress::Bars;
 use crate::cli::output::report::Report;
 use crate::cli::output::table::{Table, bytes, lines};
-use crate::offline::segments::{Joined, Segment, Source, Times, join, sources, unite};
+use crate::offline::segments::{Joined, Segment, Source, Times, join, sound_beside, sources, unite};
 use crate::offline::store::outputs::Files;
 use crate::offline::work::{Progress, proceed, save, write_settings};
 use crate::scene::GaussianScene;
@@ -115,7 +115,8 @@ impl Join {
                 Some(part) if !is_split => segments.push(part),
                 last => {
                     parts.extend(last);
-                    segments.push(Segment { path: path.clone(), scene: unite(parts, progress)? });
+                    let scene = GaussianScene { sound: sound_beside(path)?, ..unite(parts, progress)? };
+                    segments.push(Segment { path: path.clone(), scene });
                 }
             }
         }

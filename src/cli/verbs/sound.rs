@@ -134,7 +134,9 @@ impl SoundVerb {
 /// Notes a sound that is not as long as its capture, which plays for `seconds`.
 pub(super) fn note_length(sound: &Sound, seconds: f32) {
     let (own, other) = (sound.seconds(), f64::from(seconds));
-    if (own - other).abs() > 0.1 {
+    if other == 0.0 {
+        note("note: the capture is a still: nothing of the sound is heard");
+    } else if (own - other).abs() > 0.1 {
         let end = if own > other { "its end is not heard" } else { "the end of the capture is silent" };
         note(&format!("note: the sound lasts {own:.2} s and the capture {other:.2} s: {end}"));
     }

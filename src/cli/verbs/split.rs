@@ -13,7 +13,7 @@ use crate::cli::output::report::Report;
 use crate::cli::output::table::{Table, bytes, lines};
 use crate::offline::measure::belonging::require_belonging;
 use crate::offline::measure::reference_pictures::ReferencePictures;
-use crate::offline::segments::{Chunk, Chunks, Cut, LayerShares, Segment, Split, other_chunk};
+use crate::offline::segments::{Chunk, Chunks, Cut, LayerShares, Segment, Split, other_chunks, sound_path};
 use crate::offline::store::outputs::Files;
 use crate::offline::work::{Progress, proceed};
 use crate::scene::{ChunkTable, Form, SceneForm};
@@ -96,12 +96,13 @@ impl SplitVerb {
             }
         };
         let paths = split.paths(&self.out);
-        if let Some(other) = other_chunk(&self.out, &paths) {
+        if let Some(other) = other_chunks(&self.out, &paths).first() {
             let reason = "is a chunk of another split, which would be read with this one: remove it, or write to another \
                           folder";
-            return Err(Failure::about(&other, reason));
+            return Err(Failure::about(other, reason));
         }
-        files.writes_folder(&self.out, paths.into_iter().chain([index])).check()?;
+        let sound = segment.scene.sound.as_deref().map(|sound| sound_path(&self.out, sound));
+        files.writes_folder(&self.out, paths.into_iter().chain([index]).chain(sound)).check()?;
         let psnrs = if self.data.is_given() { self.measure(&segment, &split)? } else { Vec::new() };
         fs::create_dir_all(&self.out).map_err(|error| Failure::at(&self.out, &error))?;
         let chunks = split.write(&segment, &self.out, self.level, &psnrs, &mut Bars::default())?;

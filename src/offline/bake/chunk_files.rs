@@ -6,7 +6,7 @@
 use super::BakeError;
 use crate::codec::{self, ReadOptions};
 use crate::offline::compress::{PackedOrder, reorder};
-use crate::offline::segments::{Chunks, Cut, LayerShares, Segment, Split, other_chunk};
+use crate::offline::segments::{Chunks, Cut, LayerShares, Segment, Split, other_chunks};
 use crate::offline::work::{FileError, Progress};
 use crate::scene::{ChunkTable, Form, GaussianScene, PackedScene, SceneForm};
 use std::fs;
@@ -59,11 +59,7 @@ fn remove_earlier(folder: &Path, split: &Split) -> Result<(), FileError> {
         _ => Ok(()),
     };
     remove(&folder.join(ChunkTable::INDEX))?;
-    let files = split.paths(folder);
-    while let Some(other) = other_chunk(folder, &files) {
-        remove(&other)?;
-    }
-    Ok(())
+    other_chunks(folder, &split.paths(folder)).iter().try_for_each(|other| remove(other))
 }
 
 /// Returns how the capture is cut: its first layers are small, so that the first picture is soon there.

@@ -16,6 +16,7 @@
 //! | `layers` | the Gaussians of a run by importance |
 //! | `cut`, `parts` | how a capture is cut, and the Gaussians of each chunk file |
 //! | `split` | chunk files of a capture, and their index |
+//! | `sound_beside` | the sound of a capture in chunk files |
 //! | `unite` | the capture of chunks |
 
 mod alike;
@@ -29,6 +30,7 @@ mod join;
 mod layers;
 mod parts;
 mod segment;
+mod sound_beside;
 mod split;
 mod unite;
 mod windows;
@@ -40,5 +42,6 @@ pub use join::{Joined, JoinedSegment, Times, join};
 pub use layers::LayerShares;
 pub(crate) use parts::{LEAST_PACKED, lives, parts};
 pub use segment::Segment;
-pub use split::{Chunk, Chunks, Split, other_chunk};
+pub use sound_beside::{sound_beside, sound_path};
+pub use split::{Chunk, Chunks, Split, other_chunks};
 pub use unite::unite;

@@ -9,9 +9,11 @@ use super::files::chunks_in;
 use super::layers::LayerShares;
 use super::parts::{LEAST, lives, parts};
 use super::segment::Segment;
+use super::sound_beside::write_sound;
 use crate::offline::work::{FileError, Progress, proceed, save, save_chunk, write_settings};
 use crate::scene::packed::runs::Part;
 use crate::scene::{ChunkFile, ChunkTable, FilterKind, Form, GaussianScene, PackedScene, RunPart, Runs, SceneForm};
+use std::collections::HashSet;
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -136,16 +138,13 @@ impl Split {
         for (part, path) in self.parts.iter().zip(self.paths(folder)) {
             proceed(progress)?;
             let mut scene = segment.scene.select(&part.gaussians);
-            // All chunks have one environment map, and the same sockets and colliders, in the first file. The sound is in
-            // the last, for `join` alone: it would delay the first picture.
+            // All chunks have one environment map, and the same sockets and colliders, in the first file.
             scene.environment = scene.environment.filter(|_| files.is_empty());
             if !files.is_empty() {
                 scene.sockets.clear();
                 scene.colliders = None;
             }
-            if files.len() + 1 < self.parts.len() {
-                scene.sound = None;
-            }
+            scene.sound = None;
             save_chunk(&path, &scene, &settings)?;
             let bytes = fs::metadata(&path).map_err(|error| FileError::at(&path, error))?.len();
             let Part { stretches, layer, ref gaussians } = *part;
@@ -161,6 +160,7 @@ impl Split {
             files: files_of().collect(),
             utilities: utilities(psnrs, files_of()),
         };
+        write_sound(folder, segment.scene.sound.as_deref())?;
         let chunks = Some(Arc::new(table.clone()));
         let scene = GaussianScene { filter: None, sound: None, chunks, ..segment.scene.select(&[]) };
         save(&index, &scene, &settings)?;
@@ -193,15 +193,19 @@ fn remove_index(index: &Path) -> Result<(), FileError> {
     }
 }
 
-/// Returns a chunk file in a folder that is none of these files: it would be read with them. `None` if there is no such
-/// file, or no such folder.
-pub fn other_chunk(folder: &Path, files: &[PathBuf]) -> Option<PathBuf> {
-    chunks_in(folder).ok()?.into_iter().find(|chunk| !files.contains(chunk))
+/// Returns the chunk files in a folder that are none of these files: they would be read with them. None if there is no
+/// such folder.
+pub fn other_chunks(folder: &Path, files: &[PathBuf]) -> Vec<PathBuf> {
+    let mut others = chunks_in(folder).unwrap_or_default();
+    let files: HashSet<&PathBuf> = files.iter().collect();
+    others.retain(|chunk| !files.contains(chunk));
+    others
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::parts::importance;
+    use super::super::sound_beside::sound_beside;
     use super::super::unite::unite;
     use super::*;
     use crate::codec::{self, ReadOptions};
@@ -243,13 +247,13 @@ mod tests {
                 assert_eq!(chunks.table.layers(), shares.len() as u32, "as many layers as shares");
                 assert!(chunks.files.len() > 2, "several runs: {}", chunks.files.len());
                 let files = split.paths(folder.path());
-                assert_eq!(other_chunk(folder.path(), &files), None, "no other chunk");
-                assert_eq!(other_chunk(folder.path(), &files[1..]), Some(files[0].clone()), "another chunk");
+                assert!(other_chunks(folder.path(), &files).is_empty(), "no other chunk");
+                assert_eq!(other_chunks(folder.path(), &files[1..]), [files[0].clone()], "another chunk");
                 for (chunk, file) in chunks.files.iter().zip(&files) {
                     let [first, last] = chunk.times;
                     let own = read(file);
                     assert_eq!(own.scene.colliders.is_some(), *file == files[0], "the first file has the colliders");
-                    assert_eq!(own.scene.sound.is_some(), Some(file) == files.last(), "the last file has the sound");
+                    assert!(own.scene.sound.is_none(), "the sound is a file of its own");
                     let cutoff = own.scene.trained_with.marginal_cutoff;
                     for gaussian in own.scene.gaussians().expect("every Gaussian can be drawn").iter() {
                         let is_drawn = |time: f64| gaussian.marginal(time as f32) > cutoff;
@@ -260,7 +264,8 @@ mod tests {
                 let united = unite(files.iter().map(|file| read(file)).collect(), &mut NoProgress);
                 whole.scene = united.expect("chunks of one capture");
                 assert!(whole.scene.colliders.is_some(), "the whole capture has the colliders");
-                assert!(whole.scene.sound.is_some(), "the whole capture has the sound");
+                whole.scene.sound = sound_beside(folder.path()).expect("the sound can be read");
+                assert_eq!(whole.scene.sound.as_ref().map(|sound| sound.bytes()), Some(&b"a song"[..]), "the sound");
                 let written = files.iter().chain([&chunks.index]);
                 let bytes: Vec<Vec<u8>> = written.map(|file| fs::read(file).expect("it was written")).collect();
                 assert!(round == 0 || bytes == before, "the chunks of united chunks are the same files");

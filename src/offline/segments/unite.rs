@@ -29,7 +29,6 @@ pub fn unite(chunks: Vec<Segment>, progress: &mut dyn Progress) -> Result<Gaussi
         if !append(&mut all.form, scene.form) {
             return differs(Shared::Form);
         }
-        all.sound = all.sound.or(scene.sound);
         count += 1;
         filters.extend(scene.filter);
         let is_alike = |filter: &TemporalFilter| {

@@ -23,7 +23,8 @@ pub enum SoundLoadError {
 
 /// Loads sounds as [`SoundTrack`]s: Ogg Vorbis and WAV. Errors: [`SoundLoadError`].
 ///
-/// It has no extensions of its own, so that Bevy's `AudioSource` stays what `load_untyped` returns for them.
+/// Files are loaded by the type of the asset, whatever their names. The extensions of its own are for
+/// `AssetMode::Processed`, where a file named `song.ogg` is Bevy's `AudioSource`.
 #[derive(Debug, Default, Clone, Copy, TypePath)]
 #[type_path = "bevy_gs4d::asset"]
 pub struct SoundLoader;
@@ -45,6 +46,7 @@ impl AssetLoader for SoundLoader {
     }
 
     fn extensions(&self) -> &[&str] {
-        &[]
+        // A processor of assets finds a loader by the extension alone.
+        &["sound.ogg", "sound.wav"]
     }
 }

@@ -28,7 +28,7 @@ use bevy::reflect::std_traits::ReflectDefault;
 ///
 /// fn setup(mut commands: Commands, assets: Res<AssetServer>) {
 ///     commands.spawn((GaussianCapture3d(assets.load("singer.gs4d")), Upright, CaptureSound { volume: 0.8, ..default() }));
-///     let sound = CaptureSound { track: Some(assets.load("concert.ogg")), ..default() };
+///     let sound = CaptureSound { track: Some(assets.load("concert/index.ogg")), ..default() };
 ///     commands.spawn((GaussianCapture3d(assets.load("concert/index.gs4d")), Upright, sound));
 /// }
 /// # bevy::ecs::system::assert_is_system(setup);

@@ -8,6 +8,7 @@ use crate::plugin::component::GaussianCapture;
 use crate::scene::SoundFile;
 use bevy::asset::AssetId;
 use bevy::ecs::resource::Resource;
+use bevy::ecs::system::Res;
 use bevy::log::warn;
 use bevy::tasks::futures::check_ready;
 use bevy::tasks::{AsyncComputeTaskPool, Task};
@@ -55,6 +56,11 @@ impl DecodedSounds {
     pub(super) fn keep(&mut self, captures: &HashSet<AssetId<GaussianCapture>>) {
         self.0.retain(|capture, _| captures.contains(capture));
     }
+}
+
+/// Returns whether there are sounds of captures, so that those that no entity plays can be dropped.
+pub(super) fn has_decoded_sounds(sounds: Res<DecodedSounds>) -> bool {
+    !sounds.0.is_empty()
 }
 
 /// Begins to decode a sound file.

@@ -4,7 +4,7 @@
 //! follow the state; they are made in the thread of the audio device. It is a child, since the entity may have other
 //! audio.
 
-use super::component::SoundState;
+use super::component::{CaptureSound, SoundState, TimelineSound};
 use super::device_clock::DeviceClock;
 use super::follower::{SoundCue, SoundFollower};
 use super::systems::CaptureSoundSystems;
@@ -16,6 +16,7 @@ use bevy::audio::{
 use bevy::ecs::component::Component;
 use bevy::ecs::entity::Entity;
 use bevy::ecs::hierarchy::ChildOf;
+use bevy::ecs::query::{Has, With};
 use bevy::ecs::schedule::IntoScheduleConfigs;
 use bevy::ecs::system::{Commands, Local, Query, ResMut};
 use bevy::log::warn;
@@ -37,7 +38,11 @@ struct FollowedSound(Arc<Mutex<SoundCue>>, Instant);
 
 /// What the audio device plays of an entity.
 #[derive(Component)]
-pub(super) struct Followed(Arc<Mutex<SoundCue>>);
+pub(super) struct Followed {
+    cue: Arc<Mutex<SoundCue>>,
+    /// The child that plays it, which the game may have despawned.
+    child: Entity,
+}
 
 /// Adds the systems, if the app has Bevy's audio.
 pub(super) fn add(app: &mut App) {
@@ -54,21 +59,30 @@ pub(super) fn add(app: &mut App) {
 /// Tells the audio device the state of each sound.
 fn hear(
     mut sounds: ResMut<Assets<FollowedSound>>,
-    played: Query<(Entity, &SoundState, Option<&Followed>)>,
+    played: Query<(Entity, &SoundState, Option<&Followed>, (Has<CaptureSound>, Has<TimelineSound>))>,
+    players: Query<(), With<AudioPlayer<FollowedSound>>>,
     mut began: Local<Option<Instant>>,
     mut commands: Commands,
 ) {
     let began = *began.get_or_insert_with(Instant::now);
-    for (entity, state, followed) in &played {
+    for (entity, state, followed, (of_capture, of_timeline)) in &played {
+        let is_played = of_capture || of_timeline;
         let cue = state.cue(began.elapsed().as_secs_f64());
         match followed {
-            Some(Followed(shared)) => *shared.lock().unwrap_or_else(PoisonError::into_inner) = cue,
-            None => {
+            Some(Followed { child, .. }) if !is_played => {
+                commands.entity(*child).try_despawn();
+                commands.entity(entity).try_remove::<Followed>();
+            }
+            Some(Followed { cue: shared, child }) if players.contains(*child) => {
+                *shared.lock().unwrap_or_else(PoisonError::into_inner) = cue;
+            }
+            _ if is_played => {
                 let shared = Arc::new(Mutex::new(cue));
                 let player = AudioPlayer(sounds.add(FollowedSound(shared.clone(), began)));
-                commands.entity(entity).try_insert(Followed(shared));
-                commands.spawn((player, ChildOf(entity)));
+                let child = commands.spawn((player, ChildOf(entity))).id();
+                commands.entity(entity).try_insert(Followed { cue: shared, child });
             }
+            _ => {}
         }
     }
 }

@@ -4,7 +4,7 @@
 //! [`SoundState`](super::SoundState); with the feature `bevy_audio` sounds are heard.
 
 use super::component::{SoundState, TimelineSound};
-use super::decoding::DecodedSounds;
+use super::decoding::{DecodedSounds, has_decoded_sounds};
 use super::systems::{CaptureSoundSystems, bind_sounds, follow_captures, follow_timelines, rest_removed};
 use crate::plugin::asset::{set_up, set_up_late};
 use crate::plugin::playback::{PlaybackSystems, Timeline, TimelinePlayer};
@@ -48,7 +48,11 @@ fn add(app: &mut App) {
             )
                 .chain()
                 .run_if(resource_exists::<Time<Real>>)
-                .run_if(any_with_component::<SoundState>.or_else(any_with_component::<TimelinePlayer>))
+                .run_if(
+                    any_with_component::<SoundState>
+                        .or_else(any_with_component::<TimelinePlayer>)
+                        .or_else(has_decoded_sounds),
+                )
                 .in_set(CaptureSoundSystems),
         );
 }

@@ -22,7 +22,7 @@ use bevy::transform::components::Transform;
 /// The player's [`Playback`] is the playhead: play, pause, seek, reverse and loop it like the playback of a capture, or
 /// let it [follow a clock](crate::playback::FollowsClock). The player's [`PlaybackClock`] has the time of the playhead,
 /// for its tracks. Other captures and timelines can also follow the player. It begins to play once the captures of all
-/// clips can be drawn; failed captures are not awaited.
+/// clips can be drawn and its sounds are loaded; those that fail are not awaited.
 ///
 /// Each track is played by the child with the [`TimelineTrack`] of its name. Missing children are spawned.
 ///

@@ -50,7 +50,8 @@ pub(in crate::plugin::playback) fn bind_tracks(
 }
 
 /// Advances the playheads, followed players before their followers. Captures advance later: a timeline that follows a
-/// capture is one frame behind. Playback begins once the captures of all clips can be drawn.
+/// capture is one frame behind. Playback begins once the captures of all clips can be drawn
+/// and the sounds are loaded.
 pub(in crate::plugin::playback) fn advance_timelines(
     time: Res<Time>,
     timelines: Res<Assets<Timeline>>,
