@@ -143,25 +143,12 @@ impl Conversion {
     /// As [`advance`](Self::advance).
     pub(crate) fn finish(mut self) -> Result<RuntimeScene, InvalidGaussian> {
         while self.advance(usize::MAX)? {}
-        let GaussianScene {
-            form, environment, filter, trained_with, playback, sockets, colliders, sound, chunks, ..
-        } = self.scene;
-        let form = match form {
-            SceneForm::Trained(Trained { harmonics, .. }) => Form::Sliced(Sliced { gaussians: self.sliced, harmonics }),
-            SceneForm::Ready(form) => form,
-        };
-        let levels = self.before;
-        Ok(RuntimeScene {
-            form,
-            environment,
-            filter,
-            trained_with,
-            playback,
-            levels,
-            sockets,
-            colliders,
-            sound,
-            chunks,
+        let Self { scene, sliced, before: levels, .. } = self;
+        GaussianScene { levels, ..scene }.into_ready(|form| {
+            Ok(match form {
+                SceneForm::Trained(Trained { harmonics, .. }) => Form::Sliced(Sliced { gaussians: sliced, harmonics }),
+                SceneForm::Ready(form) => form,
+            })
         })
     }
 }

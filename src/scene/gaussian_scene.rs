@@ -65,6 +65,25 @@ impl GaussianScene {
         Self { form, ..self }
     }
 
+    /// Returns the scene in the form that `ready` makes of its own; all other parts stay.
+    ///
+    /// # Errors
+    /// Those of `ready`.
+    pub(crate) fn into_ready<E>(self, ready: impl FnOnce(SceneForm) -> Result<Form, E>) -> Result<RuntimeScene, E> {
+        Ok(RuntimeScene {
+            form: ready(self.form)?,
+            environment: self.environment,
+            filter: self.filter,
+            trained_with: self.trained_with,
+            playback: self.playback,
+            levels: self.levels,
+            sockets: self.sockets,
+            colliders: self.colliders,
+            sound: self.sound,
+            chunks: self.chunks,
+        })
+    }
+
     /// Checks that its parts fit together, as [`RuntimeScene::check`] does.
     ///
     /// # Errors

@@ -260,33 +260,9 @@ impl Sections {
 
     /// Returns the scene of a level of detail of which all sections have been read.
     fn into_level(self) -> Result<RuntimeScene, PackageError> {
-        let scene = self.into_scene();
-        let GaussianScene {
-            form,
-            environment,
-            filter,
-            trained_with,
-            playback,
-            levels,
-            sockets,
-            colliders,
-            sound,
-            chunks,
-        } = scene;
-        let SceneForm::Ready(form) = form else {
-            return Err(PackageError::Inconsistent("a level of detail in the trained form"));
-        };
-        Ok(RuntimeScene {
-            form,
-            environment,
-            filter,
-            trained_with,
-            playback,
-            levels,
-            sockets,
-            colliders,
-            sound,
-            chunks,
+        self.into_scene().into_ready(|form| match form {
+            SceneForm::Ready(form) => Ok(form),
+            SceneForm::Trained(_) => Err(PackageError::Inconsistent("a level of detail in the trained form")),
         })
     }
 }
