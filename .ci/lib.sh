@@ -13,7 +13,7 @@ exec </dev/null
 # The features that are built separately, without and with Bevy. Left out are `default`, which implies `bevy`, `openxr`,
 # which is not tested, and `web`, with which `.ci/web` builds the pages for wasm32.
 without_bevy=(sound renderer offline fourdgs cli)
-with_bevy=(bevy pbr picking testing inspector bevy_audio viewer)
+with_bevy=(bevy pbr picking testing inspector bevy_audio http_ranges viewer)
 # The features that all tests, examples and documents together need.
 everything=viewer,cli
 

@@ -192,11 +192,12 @@
 //! | `picking` (default) | pointer events on captures | `bevy` |
 //! | `sound` | decoding of sound files ([`codec::sound`]) | |
 //! | `bevy_audio` | sounds are heard through Bevy's audio | `bevy`, `sound` |
+//! | `http_ranges` | captures in one file from servers, read in parts ([`stream::HttpRangesPlugin`]) | `bevy` |
 //! | `fourdgs` | reading and writing `.4dgs` files | |
 //! | `cli` | [`cli`], the `gs4d` command; never compiles Bevy | `offline`, `fourdgs` |
 //! | `inspector` | [`inspector`]: a panel that shows and edits captures | `bevy` |
 //! | `testing` | [`testing`]: Bevy apps without a window, drawn into pictures | `bevy` |
-//! | `viewer` | what the examples need: a window, lit meshes | `pbr`, `picking`, `inspector`, `sound`, `testing` |
+//! | `viewer` | what the examples need: a window, lit meshes | `pbr`, `picking`, `inspector`, `sound`, `http_ranges`, `testing` |
 //! | `openxr` | the example `walkthrough` for a headset, untried | `viewer` |
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![cfg_attr(

@@ -7,12 +7,18 @@ use crate::figures::scattered;
 use crate::timer::Timer;
 use bevy::asset::AssetPath;
 use bevy::asset::io::file::FileAssetReader;
-use bevy::asset::io::{AssetReader, AssetReaderError, AssetSourceBuilder, PathStream, Reader, VecReader};
+use bevy::asset::io::{
+    AssetReader, AssetReaderError, AssetSourceBuilder, PathStream, Reader, ReaderNotSeekableError, SeekableReader,
+    VecReader,
+};
 use bevy::prelude::*;
+use bevy::tasks::futures_lite::{AsyncRead, AsyncSeek};
 use std::fmt;
-use std::io::{Error, ErrorKind};
+use std::io::{Error, ErrorKind, SeekFrom};
 use std::path::{Path, PathBuf};
+use std::pin::Pin;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::task::{Context, Poll, ready};
 use std::time::{Duration, Instant};
 
 /// How good a link is. Default: as good as the disk.
@@ -108,10 +114,9 @@ impl Link {
     }
 
     /// Begins a request. Returns whether it fails; that for the index does not, since a game would ask again.
-    fn ask(&self, path: &Path) -> bool {
+    fn ask(&self, is_index: bool) -> bool {
         let mut traffic = self.lock();
         traffic.requests += 1;
-        let is_index = self.index.file_name() == Some(path.as_os_str());
         let is_lost = !is_index && scattered(traffic.requests) < self.quality.lost;
         traffic.lost += u64::from(is_lost);
         is_lost
@@ -151,15 +156,9 @@ struct LinkReader {
 
 impl AssetReader for LinkReader {
     async fn read<'a>(&'a self, path: &'a Path) -> Result<impl Reader + 'a, AssetReaderError> {
-        let (link, asked) = (&self.link, Instant::now());
-        if link.ask(path) {
-            link.timer.wait_until(asked + link.quality.latency).await;
-            return Err(Error::new(ErrorKind::TimedOut, "the simulated link lost the request").into());
-        }
-        let mut bytes = Vec::new();
-        self.files.read(path).await?.read_to_end(&mut bytes).await?;
-        link.timer.wait_until(link.arrival(asked, bytes.len())).await;
-        Ok(VecReader::new(bytes))
+        let file: Box<dyn Reader + 'a> = Box::new(self.files.read(path).await?);
+        let is_index = self.link.index.file_name() == Some(path.as_os_str());
+        Ok(OverLink { file, link: &self.link, is_index, request: None, wait: None, arrived: Vec::new() })
     }
 
     /// There are no files of settings, so that nothing asks for them over the link.
@@ -173,5 +172,65 @@ impl AssetReader for LinkReader {
 
     async fn is_directory<'a>(&'a self, path: &'a Path) -> Result<bool, AssetReaderError> {
         self.files.is_directory(path).await
+    }
+}
+
+/// A file, or a part of it, on its way: the bytes that are read, from one position on, are one request.
+struct OverLink<'a> {
+    file: Box<dyn Reader + 'a>,
+    link: &'a Link,
+    /// Whether the file begins with the index, whose request is not lost, and the position has not changed.
+    is_index: bool,
+    /// When the request was sent, and whether it is lost.
+    request: Option<(Instant, bool)>,
+    /// Bytes that are on their way, and those that have arrived.
+    wait: Option<Pin<Box<dyn Future<Output = ()> + Send + Sync + 'a>>>,
+    arrived: Vec<u8>,
+}
+
+impl AsyncRead for OverLink<'_> {
+    fn poll_read(self: Pin<&mut Self>, context: &mut Context<'_>, buffer: &mut [u8]) -> Poll<Result<usize, Error>> {
+        let own = self.get_mut();
+        let (link, is_index) = (own.link, own.is_index);
+        let (asked, is_lost) = *own.request.get_or_insert_with(|| (Instant::now(), link.ask(is_index)));
+        if own.wait.is_none() && own.arrived.is_empty() {
+            let mut bytes = vec![0; buffer.len()];
+            let count = ready!(Pin::new(&mut own.file).poll_read(context, &mut bytes))?;
+            bytes.truncate(count);
+            let arrival = if is_lost { asked + link.quality.latency } else { link.arrival(asked, count) };
+            own.arrived = bytes;
+            own.wait = Some(Box::pin(link.timer.wait_until(arrival)));
+        }
+        if let Some(wait) = &mut own.wait {
+            ready!(wait.as_mut().poll(context));
+            own.wait = None;
+        }
+        if is_lost {
+            return Poll::Ready(Err(Error::new(ErrorKind::TimedOut, "the simulated link lost the request")));
+        }
+        let count = own.arrived.len().min(buffer.len());
+        for (to, from) in buffer.iter_mut().zip(own.arrived.drain(..count)) {
+            *to = from;
+        }
+        Poll::Ready(Ok(count))
+    }
+}
+
+impl AsyncSeek for OverLink<'_> {
+    /// Begins another request.
+    fn poll_seek(self: Pin<&mut Self>, context: &mut Context<'_>, to: SeekFrom) -> Poll<Result<u64, Error>> {
+        let own = self.get_mut();
+        (own.is_index, own.request, own.wait) = (false, None, None);
+        own.arrived.clear();
+        match own.file.seekable() {
+            Ok(file) => Pin::new(file).poll_seek(context, to),
+            Err(error) => Poll::Ready(Err(Error::other(error))),
+        }
+    }
+}
+
+impl Reader for OverLink<'_> {
+    fn seekable(&mut self) -> Result<&mut dyn SeekableReader, ReaderNotSeekableError> {
+        Ok(self)
     }
 }

@@ -85,6 +85,19 @@ impl Loading {
         Ok(Self { path, options: options.clone(), supplied, wanted, lost: lost.into_iter().collect(), state })
     }
 
+    /// As [`new`](Self::new), of an index that chunk files follow in one file
+    /// ([`Following::From`](package::Following::From)). `bytes` are those before the first of these. The scene is the index,
+    /// whose table says where the files are ([`ChunkTable::range`]).
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn of_index(name: impl AsRef<Path>, bytes: Vec<u8>, options: &ReadOptions) -> Result<Self, CodecError> {
+        let path = name.as_ref().to_owned();
+        let state = State::of_index(bytes, options).map_err(|kind| CodecError::at(&path, kind))?;
+        let lost = options.without_effect().into_iter().collect();
+        Ok(Self { path, options: options.clone(), supplied: Supplied::default(), wanted: None, lost, state })
+    }
+
     /// Does one step towards a scene that can be drawn. A step of a package or of the conversion reads, decompresses,
     /// stores or converts about `bytes` at most. Returns whether there is more to do.
     ///
@@ -201,6 +214,12 @@ impl State {
             return Ok(Self::Package(Box::new(Reading::new(Cursor::new(bytes))?)));
         }
         Ok(Self::Whole(Box::new(Found::of(Input::of(bytes), path, Box::new(supplied.clone()))?)))
+    }
+
+    fn of_index(bytes: Vec<u8>, options: &ReadOptions) -> Result<Self, CodecErrorKind> {
+        options.check().map_err(PackageError::from)?;
+        let length = bytes.len() as u64;
+        Ok(Self::Package(Box::new(Reading::of_index(Cursor::new(bytes), length)?)))
     }
 
     /// Begins to convert a scene.

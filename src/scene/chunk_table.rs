@@ -5,6 +5,7 @@
 //! one.
 
 use serde::{Deserialize, Serialize};
+use std::ops::Range;
 
 /// The chunk files of a capture, in the order of their numbers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -20,6 +21,10 @@ pub struct ChunkTable {
     /// not measured.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub utilities: Vec<f32>,
+    /// Where the first file is in the file of the index, bytes from its start, if the files follow the index in one file,
+    /// one after the other. `None`: each is a file beside the index.
+    #[serde(skip)]
+    pub first_byte: Option<u64>,
 }
 
 /// A chunk file: Gaussians that are only drawn within some stretches of time.
@@ -71,6 +76,14 @@ impl ChunkTable {
     /// Returns the name of a chunk file. `number` counts from 0.
     pub fn file_name(number: usize, of: usize) -> String {
         format!("chunk-{:05}-of-{of:05}.gs4d", number + 1)
+    }
+
+    /// Returns where a file is in the file of the index, bytes from its start. `number` counts from 0. `None`: the files
+    /// are beside the index, or there is no such file.
+    pub fn range(&self, number: usize) -> Option<Range<u64>> {
+        let (own, before) = (self.files.get(number)?, self.files.get(..number)?);
+        let start = before.iter().fold(self.first_byte?, |end, file| end.saturating_add(file.bytes));
+        Some(start..start.saturating_add(own.bytes))
     }
 
     /// Returns the bytes of a file's Gaussians on the GPU. `file` counts from 0; 0 for a file that is not there.
@@ -186,6 +199,7 @@ mod tests {
             gaussian_bytes: 80,
             files: vec![file(0, 0, 0), file(0, 3, 1), file(2, 3, 0)],
             utilities: Vec::new(),
+            first_byte: None,
         }
     }
 
@@ -207,6 +221,14 @@ mod tests {
         assert_eq!(delays(&[64.0, 16.0, 4.0, 2.0]), [0.0, 1.0, 2.0, 2.5], "a quarter, a sixteenth, half of that");
         assert_eq!(delays(&[8.0, 16.0, 0.0, -1.0]), [0.0, 0.0, 16.0, 16.0], "more utility, none, and worse pictures");
         assert_eq!(delays(&[0.0, 0.0, -1.0, 1.0]), [0.0, 16.0, 16.0, 0.0], "a first layer without utility");
+    }
+
+    #[test]
+    fn files_in_one_file_follow_one_another() {
+        let inside = ChunkTable { first_byte: Some(500), ..table() };
+        assert_eq!([0, 2].map(|number| inside.range(number)), [Some(500..1500), Some(2500..3500)], "after the index");
+        assert_eq!((inside.range(3), table().range(0)), (None, None), "no such file, and files beside the index");
+        assert_eq!(ron::to_string(&inside), ron::to_string(&table()), "where they are follows from the file");
     }
 
     #[test]
@@ -242,7 +264,7 @@ mod tests {
     fn pages_are_whole() {
         let table = |gaussians| {
             let file = ChunkFile { stretches: [0, 0], layer: 0, gaussians, bytes: 0 };
-            ChunkTable { stretches: 1, gaussian_bytes: 80, files: vec![file], utilities: Vec::new() }
+            ChunkTable { stretches: 1, gaussian_bytes: 80, files: vec![file], utilities: Vec::new(), first_byte: None }
         };
         let pages = |gaussians| table(gaussians).page_bytes(0) / (80 * ChunkTable::PAGE);
         assert_eq!([0, 1, 255, 256, 257, 512, 513].map(pages), [0, 1, 1, 1, 2, 2, 3], "256 Gaussians to a page");

@@ -30,6 +30,7 @@ mod sliced;
 mod socket;
 mod sound_file;
 pub mod synth;
+pub(crate) mod union;
 
 pub use bounds::{Bounds, BoundsOverTime};
 pub use chunk_table::{ChunkFile, ChunkTable};

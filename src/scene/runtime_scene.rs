@@ -249,7 +249,8 @@ mod tests {
             "levels of decreasing size are accepted"
         );
         let map = Environment { width: 1, height: 1, texels: vec![0.0; 3] };
-        let chunks = ChunkTable { stretches: 1, gaussian_bytes: 88, files: Vec::new(), utilities: Vec::new() };
+        let chunks =
+            ChunkTable { stretches: 1, gaussian_bytes: 88, files: Vec::new(), utilities: Vec::new(), first_byte: None };
         let other = TrainedWith { time_interval: [0.0, 2.0], ..TrainedWith::default() };
         let bad = [
             vec![level(8.0, empty()), level(64.0, empty())],

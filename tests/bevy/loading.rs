@@ -93,7 +93,8 @@ impl AssetLoader for Counting {
         reader.read_to_end(&mut bytes).await?;
         // Nothing has to be waited for: a loader that is not ready pauses.
         let mut at_hand = VecReader::new(bytes);
-        let mut loading = pin!(CaptureLoader.load(&mut at_hand, settings, context));
+        let loader = CaptureLoader::default();
+        let mut loading = pin!(loader.load(&mut at_hand, settings, context));
         let poll = poll_fn(|context| {
             let polled = loading.as_mut().poll(context);
             self.0.fetch_add(usize::from(polled.is_pending()), Ordering::Relaxed);

@@ -24,6 +24,7 @@ mod inspector;
 mod late_hits;
 mod loading;
 mod motion;
+mod one_file;
 mod own_shadows;
 mod picker;
 mod picking_backend;
@@ -68,8 +69,10 @@ mod support {
     pub mod playback_app;
     pub mod pth;
     pub mod random;
+    pub mod range_server;
     pub mod skip;
     pub mod spans;
+    pub mod split;
     pub mod waiting;
     pub mod warning_layer;
     pub mod wave;

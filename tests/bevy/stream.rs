@@ -12,6 +12,7 @@ use crate::support::fixtures::synthetic_eye;
 use crate::support::gated_files::GatedFiles;
 use crate::support::offscreen_app::{self, picture, run_frames, spawn_camera};
 use crate::support::playback_app::{self, change, get, pass};
+use crate::support::split::{PACKED, SPLIT, Split};
 use crate::support::waiting::wait_until;
 use bevy::camera::visibility::RenderLayers;
 use bevy::ecs::system::RunSystemOnce;
@@ -19,7 +20,6 @@ use bevy::prelude::*;
 use bevy::render::renderer::RenderDevice;
 use bevy::time::TimeUpdateStrategy;
 use bevy_gs4d::codec::stream::StreamSchedule;
-use bevy_gs4d::codec::{self, ReadOptions};
 use bevy_gs4d::playback::{Clip, ClipFade, FollowsClock, PlaybackClock, Timeline, TimelinePlayer, Track};
 use bevy_gs4d::prelude::*;
 use bevy_gs4d::render::CaptureSettings;
@@ -31,11 +31,8 @@ use bevy_gs4d::stream::{
 use bevy_gs4d::testing;
 use image::{Rgba, RgbaImage};
 use std::collections::{BTreeMap, BTreeSet};
-use std::ffi::OsString;
 use std::fs;
-use std::path::Path;
-use std::process::Command;
-use std::sync::{Arc, LazyLock};
+use std::sync::Arc;
 use std::time::Duration;
 use tempfile::TempDir;
 
@@ -47,57 +44,8 @@ const LATE: f32 = 3.6;
 const INDEX: &str = "gated://index.gs4d";
 /// The name of the file of the joined capture.
 const JOINED: &str = "joined.gs4d";
-
-/// A capture in chunk files.
-struct Split {
-    /// The index and the chunk files, by name.
-    files: BTreeMap<String, Vec<u8>>,
-    /// The capture that `gs4d join` makes of them.
-    joined: Vec<u8>,
-    table: Arc<ChunkTable>,
-}
-
-static SPLIT: LazyLock<Split> = LazyLock::new(|| {
-    let split = split("--count 12000 --sh-degree 0", None, "--chunk 0.5 --layers 25,25,50");
-    assert_eq!((split.table.stretches, split.table.layers()), (8, 3), "stretches of half a second, in three layers");
-    split
-});
-
-/// A packed capture in chunk files, whose codebooks are in the index.
-static PACKED: LazyLock<Split> = LazyLock::new(|| {
-    let order = "--chunk 1 --layers 25,75 --codebooks 64,32 --verify 0";
-    let split = split("--count 30000 --sh-degree 1", Some(order), "");
-    assert_eq!((split.table.stretches, split.table.layers()), (4, 2), "stretches of a second, in two layers");
-    split
-});
-
-/// Makes a synthetic capture with these options, compresses it with others, if any, and cuts it with further ones.
-fn split(synthetic: &str, packed: Option<&str>, cut: &str) -> Split {
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let [mut whole, chunks, joined] = ["whole.gs4d", "chunks", "joined.gs4d"].map(|name| folder.path().join(name));
-    let words = |words: &str| words.split_whitespace().map(OsString::from).collect::<Vec<_>>();
-    let file = |path: &Path| vec![path.as_os_str().to_owned()];
-    run(&[words("synth"), file(&whole), words(synthetic), words("--duration 4 --level 1")].concat());
-    if let Some(order) = packed {
-        let out = folder.path().join("packed.gs4d");
-        run(&[words("compress"), file(&whole), file(&out), words(order), words("--level 1")].concat());
-        whole = out;
-    }
-    run(&[words("split"), file(&whole), words("-o"), file(&chunks), words(cut), words("--level 1")].concat());
-    run(&[words("join"), file(&chunks), words("-o"), file(&joined), words("--level 1")].concat());
-    let read = |path: &Path| fs::read(path).expect("the command has written it");
-    let entries = fs::read_dir(&chunks).expect("the command has made it").map(|entry| entry.expect("readable"));
-    let files = entries.map(|entry| (entry.file_name().to_string_lossy().into_owned(), read(&entry.path()))).collect();
-    let index = codec::load(&chunks.join(ChunkTable::INDEX), &ReadOptions::default()).expect("a package");
-    let table = index.chunks.expect("an index has a table");
-    Split { files, joined: read(&joined), table }
-}
-
-/// Runs the `gs4d` command.
-fn run(arguments: &[OsString]) {
-    let output = Command::new(env!("CARGO_BIN_EXE_gs4d")).args(arguments).output().expect("the command starts");
-    assert!(output.status.success(), "gs4d {arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
-}
+/// The name of the file of the index and all chunk files.
+const ONE: &str = "one.gs4d";
 
 /// Returns the numbers of all chunk files.
 fn all_files() -> BTreeSet<usize> {
@@ -720,7 +668,7 @@ impl Studio {
         let mut app = offscreen_app::app(UVec2::new(96, 72))?;
         let folder = tempfile::tempdir().expect("a temporary folder");
         let files = split.files.iter().map(|(name, bytes)| (name.as_str(), bytes));
-        for (name, bytes) in files.chain([(JOINED, &split.joined)]) {
+        for (name, bytes) in files.chain([(JOINED, &split.joined), (ONE, &split.one)]) {
             fs::write(folder.path().join(name), bytes).expect("the folder can be written to");
         }
         spawn_camera(&mut app, Msaa::Off, synthetic_eye());
@@ -734,7 +682,7 @@ impl Studio {
         let entity = self.app.world_mut().spawn(player).id();
         testing::settle(&mut self.app).expect("the app draws without an error");
         let is_streamed = self.app.world().get::<CaptureStreamState>(entity).is_some();
-        assert_eq!(is_streamed, file == ChunkTable::INDEX, "the capture of {file} is streamed, or is not");
+        assert_eq!(is_streamed, file != JOINED, "the capture of {file} is streamed, or is not");
         entity
     }
 
@@ -791,9 +739,12 @@ fn check_pictures(split: &Split) {
     let Some(mut studio) = Studio::of(split) else { return };
     // The beginning, the end, the boundary of two stretches, and two others.
     let times = [0.0, 1.3, 2.0, 2.77, SECONDS];
-    let [streamed, whole] = [ChunkTable::INDEX, JOINED].map(|file| studio.pictures(file, &times));
-    for ((seconds, streamed), whole) in times.into_iter().zip(&streamed).zip(&whole) {
-        check_picture(streamed, whole, &format!("{seconds} s"));
+    let whole = studio.pictures(JOINED, &times);
+    for file in [ChunkTable::INDEX, ONE] {
+        let streamed = studio.pictures(file, &times);
+        for ((seconds, streamed), whole) in times.into_iter().zip(&streamed).zip(&whole) {
+            check_picture(streamed, whole, &format!("{file} at {seconds} s"));
+        }
     }
     assert_ne!(whole[0], whole[1], "the capture moves");
 }

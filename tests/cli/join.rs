@@ -6,6 +6,7 @@
 
 use crate::support::command::{arguments, folder, gs4d};
 use crate::support::folders::{contents, names};
+use crate::support::wave::wave;
 use bevy_gs4d::codec::{self, ReadOptions};
 use bevy_gs4d::offline::measure::SquaredError;
 use bevy_gs4d::reference;
@@ -163,7 +164,7 @@ fn chunks_are_in_layers_and_the_index_lists_them() {
     let info = gs4d(&arguments!["info", &index, "--json"]).json();
     let bytes = sum - size(&index);
     let expected = serde_json::json!({
-        "files": 4, "stretches": 2, "layers": 2, "gaussians": 1200, "bytes": bytes, "decibels_per_megabyte": [],
+        "files": 4, "stretches": 2, "layers": 2, "gaussians": 1200, "bytes": bytes, "first_byte": null, "decibels_per_megabyte": [],
     });
     assert_eq!((&info["chunks"], &info["gaussians"]), (&expected, &0.into()), "the files of an empty package: {info}");
     let text = gs4d(&arguments!["info", &index]).text();
@@ -211,6 +212,27 @@ fn packed_chunks_are_the_package_as_it_was() {
 
         let (back, _) = joined(&folder, std::slice::from_ref(&chunks), "back.gs4d", &[]);
         assert!(fs::read(&back).ok() == fs::read(&package).ok(), "{name}: the same bytes");
+        let one = folder.path().join("one.gs4d");
+        let in_one = gs4d(&arguments!["split", &package, "-o", &one, "--json"]).json();
+        let mut together = fs::read(&one).expect("it is written");
+        let start = in_one["chunks"][0]["first_byte"].as_u64().expect("a number") as usize;
+        assert_eq!(
+            (&in_one["bytes_out"], &in_one["index"]["bytes"]),
+            (&together.len().into(), &start.into()),
+            "{name}"
+        );
+        let followed: Vec<u8> = files
+            .iter()
+            .filter(|file| !file.ends_with("index.gs4d"))
+            .fold(vec![], |all, file| [all, fs::read(file).expect("a chunk file")].concat());
+        assert!(together.split_off(start) == followed, "{name}: the same chunk files follow the index");
+        let (back, _) = joined(&folder, std::slice::from_ref(&one), "from-one.gs4d", &[]);
+        assert!(fs::read(&back).ok() == fs::read(&package).ok(), "{name}: the package again, from one file");
+        assert!(read(&one) == read(&package), "{name}: any program reads all of it");
+        let info_of_one = gs4d(&arguments!["info", &one, "--json"]).json();
+        assert_eq!(info_of_one["gaussians"], info["gaussians"], "{name}: the whole capture: {info_of_one}");
+        assert_eq!(info_of_one["chunks"]["first_byte"], start, "{name}: and where its chunk files are");
+
         let alone = read(&files[0]);
         let range = alone.len() < read(&package).len();
         assert!(range && alone.chunks.is_none(), "a chunk file is a capture of some of the Gaussians");
@@ -242,6 +264,31 @@ fn each_packed_gaussian_is_in_a_file_of_its_times() {
     let longer = folder.path().join("longer.gs4d");
     gs4d(&arguments!["convert", &package, &longer, "--cutoff", "0.01"]).text();
     gs4d(&arguments!["split", &longer, "-o", &chunks]).must_fail("gs4d compress --chunk");
+}
+
+#[test]
+fn a_damaged_chunk_file_in_one_file_is_named() {
+    let folder = folder();
+    let [whole, one, sound, with_sound] =
+        ["whole.gs4d", "one.gs4d", "a.wav", "with-sound.gs4d"].map(|name| folder.path().join(name));
+    gs4d(&arguments!["synth", &whole, "--count", "2000", "--duration", "2"]).text();
+    let text = gs4d(&arguments!["split", &whole, "-o", &one]).text();
+    assert!(text.contains("chunk files in one file") && text.contains("the beginning, "), "{text}");
+    gs4d(&arguments!["split", &one, "-o", &one]).must_fail("the input itself");
+    let good = fs::read(&one).expect("it is written");
+    let mut bad = good.clone();
+    let last = bad.len() - 1;
+    bad[last] ^= 1;
+    fs::write(&one, &bad).expect("the folder can be written to");
+    let damaged = gs4d(&arguments!["info", &one]);
+    damaged.must_fail("chunk files are damaged; copy or download the package again");
+    gs4d(&arguments!["convert", &one, folder.path().join("out.gs4d")]).must_fail("chunk file ");
+    fs::write(&one, &good[..last]).expect("the folder can be written to");
+    gs4d(&arguments!["info", &one]).must_fail("cut off");
+
+    fs::write(&sound, wave(1, 8_000, &[0; 800])).expect("the folder can be written to");
+    gs4d(&arguments!["sound", &whole, &sound, "-o", &with_sound]).text();
+    gs4d(&arguments!["split", &with_sound, "-o", &one]).must_fail("gs4d sound --extract");
 }
 
 #[test]

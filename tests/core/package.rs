@@ -6,7 +6,7 @@
 
 use crate::support::coded_scene::coded_scene;
 use crate::support::package_parts::Parts;
-use bevy_gs4d::codec::package::{self, MAGIC, PackageError, PackageInfo, VERSION, WriteSettings};
+use bevy_gs4d::codec::package::{self, Following, MAGIC, PackageError, PackageInfo, VERSION, WriteSettings};
 use bevy_gs4d::codec::{Loading, ReadOptions};
 use bevy_gs4d::gaussian::{Gaussian, Harmonics, Model, Parameters};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
@@ -868,7 +868,7 @@ fn index(files: usize) -> GaussianScene {
         ChunkFile { stretches, layer: layer as u32, gaussians: 12_345, bytes: bytes as u64 }
     };
     let files = (0..files).map(file).collect();
-    let table = ChunkTable { stretches: 3_600, gaussian_bytes: 88, files, utilities: Vec::new() };
+    let table = ChunkTable { stretches: 3_600, gaussian_bytes: 88, files, utilities: Vec::new(), first_byte: None };
     let shape = Shape { model: None, count: 0, ..SMALL };
     GaussianScene { chunks: Some(Arc::new(table)), ..scene(&shape, 35) }
 }
@@ -896,6 +896,93 @@ fn the_table_of_an_index_is_read_as_it_was_written() {
     assert_eq!(loading.finish().expect("the scene can be drawn").chunks, again.chunks, "also if it is read in steps");
 }
 
+/// Gaussians of each chunk file in one file.
+const CHUNK: usize = 300;
+
+/// Returns two chunk files of a capture, and the file of their index and both.
+fn in_one_file() -> ([GaussianScene; 2], Vec<u8>) {
+    let scenes = [1, 2].map(|seed| synthesize(&SynthSettings { count: CHUNK, seed, ..SynthSettings::default() }));
+    let bodies = scenes.each_ref().map(pack);
+    let file = |layer: usize| ChunkFile {
+        stretches: [0, 0],
+        layer: layer as u32,
+        gaussians: CHUNK as u64,
+        bytes: bodies[layer].len() as u64,
+    };
+    let table = ChunkTable { files: vec![file(0), file(1)], ..(*index(0).chunks.expect("a table")).clone() };
+    let mut whole = Vec::new();
+    let empty = synthesize(&SynthSettings { count: 0, ..SynthSettings::default() });
+    let index = GaussianScene { chunks: Some(Arc::new(table)), ..empty };
+    package::write_index(&mut whole, &index, &WriteSettings::default()).expect("the index can be written");
+    bodies.iter().for_each(|body| whole.extend_from_slice(body));
+    (scenes, whole)
+}
+
+#[test]
+fn an_index_and_the_chunk_files_after_it_are_one_capture() {
+    let (scenes, whole) = in_one_file();
+    let first = whole.len() - scenes.iter().map(|scene| pack(scene).len()).sum::<usize>();
+    let of = |length: usize| Following::of(&whole[..length]);
+    assert_eq!([of(0), of(100)], [Following::Undecided; 2], "the header decides");
+    assert_eq!([of(first), of(whole.len())], [Following::From(first as u64); 2], "they follow the index");
+    assert_eq!(Following::of(&pack(&scenes[0])), Following::Nothing, "nothing follows another package");
+    assert_eq!(Following::of(b"ply"), Following::Nothing, "nor another file");
+
+    let united = read(&whole).expect("readable");
+    assert_eq!((united.len(), &united.chunks), (2 * CHUNK, &None), "the Gaussians of both, and no table");
+    let both = bits(&scenes[0]).into_iter().zip(bits(&scenes[1])).map(|(first, second)| [first, second].concat());
+    assert!(bits(&united) == both.collect::<Vec<_>>(), "those of the second after those of the first");
+    for size in [1_000, usize::MAX] {
+        let mut loading = Loading::new("take.gs4d", whole.clone(), &ReadOptions::default()).expect("a package");
+        let mut before = 0.0;
+        while loading.advance(size).expect("readable") {
+            assert!((before..=1.0).contains(&loading.progress()), "the progress does not go back");
+            before = loading.progress();
+        }
+        assert_eq!(loading.finish().expect("readable").len(), 2 * CHUNK, "in steps of {size}");
+    }
+    let options = ReadOptions::default();
+    let alone = Loading::of_index("take.gs4d", whole[..first].to_vec(), &options).expect("an index").finish();
+    let alone = alone.expect("readable");
+    let table = alone.chunks.expect("a table");
+    assert_eq!((alone.form.len(), table.range(0).map(|range| range.start)), (0, Some(first as u64)), "the index alone");
+    assert_eq!(table.range(1).map(|range| range.end), Some(whole.len() as u64), "and where each file is");
+    assert!(Loading::of_index("take.gs4d", whole[..first - 1].to_vec(), &options).is_err(), "an index that is cut off");
+
+    let info = inspect(&whole).expect("readable");
+    assert!(info.is_intact() && info.header.requires.contains(&"chunks_follow".to_owned()), "older readers refuse it");
+}
+
+#[test]
+fn faults_of_chunk_files_in_one_file_are_named() {
+    let (_, whole) = in_one_file();
+    assert!(refusal(&whole[..whole.len() - 1]).to_string().contains("cut off"), "the end is missing");
+    assert!(refusal(&[&whole[..], b"!"].concat()).to_string().contains("too many"), "a byte more");
+    let mut damaged = whole.clone();
+    *damaged.last_mut().expect("bytes") ^= 1;
+    assert!(refusal(&damaged).to_string().starts_with("chunk file 2: "), "by its number: {}", refusal(&damaged));
+    let info = inspect(&damaged).expect("the index is intact");
+    assert_eq!((info.damaged.len(), info.damaged_files), (0, vec![1]), "by its number, from 0");
+
+    // An index whose table says something else than its files.
+    let start = whole.len() - in_one_file().0.iter().map(|scene| pack(scene).len()).sum::<usize>();
+    let (head, files) = whole.split_at(start);
+    let with = |from: &str, to: &str, files: &[u8]| [&Parts::of(head).swap(from, to).seal(), files].concat();
+    let count = CHUNK;
+    let other = with(&format!("(0, 0, 1, {count}, "), &format!("(0, 0, 1, {}, ", count + 1), files);
+    assert!(refusal(&other).to_string().contains("another number of Gaussians"), "{}", refusal(&other));
+    let alone = with("chunks: Some(", "later: Some(", &[]);
+    assert!(refusal(&alone).to_string().contains("without a table"), "{}", refusal(&alone));
+    let nested = {
+        let inner = pack(&index(0));
+        let table = format!("(0, 0, 1, {count}, {})", pack(&in_one_file().0[1]).len());
+        let files = [&files[..files.len() / 2], &inner].concat();
+        with(&table, &format!("(0, 0, 1, {count}, {})", inner.len()), &files)
+    };
+    assert!(refusal(&nested).to_string().contains("chunk files itself"), "{}", refusal(&nested));
+    assert_eq!(inspect(&nested).expect("the index is intact").damaged_files, [1], "an index is no chunk file");
+}
+
 #[test]
 fn bad_tables_of_chunk_files_are_neither_read_nor_written() {
     let good = Parts::of(&pack(&index(2)));
@@ -911,7 +998,8 @@ fn bad_tables_of_chunk_files_are_neither_read_nor_written() {
         let message = refusal(&good.clone().swap(from, to).seal()).to_string();
         assert!(message.contains(expected), "{from} as {to}: {message}");
     }
-    let table = ChunkTable { stretches: 0, gaussian_bytes: 88, files: Vec::new(), utilities: Vec::new() };
+    let table =
+        ChunkTable { stretches: 0, gaussian_bytes: 88, files: Vec::new(), utilities: Vec::new(), first_byte: None };
     let bad = GaussianScene { chunks: Some(Arc::new(table)), ..index(0) };
     let mut nested = detailed();
     let level = nested.levels[1].scene.as_ref().clone();

@@ -88,8 +88,13 @@ impl Files {
             bytes: 1,
         };
         let gaussian_bytes = GaussianScene::from(whole.clone()).gaussian_bytes();
-        let table =
-            ChunkTable { stretches: 4, gaussian_bytes, files: files.iter().map(row).collect(), utilities: Vec::new() };
+        let table = ChunkTable {
+            stretches: 4,
+            gaussian_bytes,
+            files: files.iter().map(row).collect(),
+            utilities: Vec::new(),
+            first_byte: None,
+        };
         Self { index: cut(&whole, 0..0), whole, files, table: table.into() }
     }
 

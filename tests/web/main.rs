@@ -246,6 +246,20 @@ fn a_capture_in_chunk_files_plays_while_its_files_arrive() {
 }
 
 #[test]
+fn parts_of_one_file_are_fetched_and_without_parts_it_is_played_whole() {
+    check_all("parts");
+}
+
+#[test]
+fn an_app_of_bevy_streams_chunk_files_and_parts_of_one_file() {
+    if seen().is_some_and(|seen| !seen.results.contains_key("app-streams")) {
+        skip("the page has no app of Bevy: `bash .ci/web --bevy`");
+    } else {
+        check_all("app-streams");
+    }
+}
+
+#[test]
 fn chunk_files_that_fail_are_asked_for_again_and_a_missing_one_is_named() {
     check_all("faults");
 }

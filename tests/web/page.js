@@ -356,6 +356,29 @@ async function faults() {
   await player.close('faults');
 }
 
+// A capture whose chunk files follow their index in one file.
+async function parts() {
+  const player = await open('capture=/parts.gs4d&autoplay=0');
+  const { page, had, at, inside, picture } = player;
+  const results = {};
+  await until('all files', () => page.thereShare === 1);
+  results['its Gaussians are counted'] = page.about.gaussians === 4000 && page.about.seconds === 2;
+  const requests = () => inside.performance.getEntriesByType('resource').filter((one) => one.name.endsWith('/parts.gs4d')).length;
+  results['the file, a byte of it to see whether there are parts, and parts are fetched'] = requests() > 4;
+  const streamed = await picture();
+  await page.openAddress('/whole.gs4d');
+  results['a server without parts is named'] = at('said').textContent.includes(`${location.host} sends no parts of files`);
+  results['and the capture played whole'] = page.about.gaussians === 4000 && page.thereShare === 1;
+  const bytes = new Uint8Array(await (await fetch('/whole.gs4d')).arrayBuffer());
+  const before = requests();
+  await page.openBytes('one.gs4d', bytes);
+  await until('the parts of a file of this device', () => page.about.gaussians === 4000 && page.thereShare === 1);
+  results['of a file of this device parts are read, too'] = requests() === before && !differ(streamed, await picture());
+  results['no message'] = at('message').hidden && had('error').length === 0;
+  await post('parts', results);
+  await player.close('parts');
+}
+
 async function missing() {
   const player = await open('test=missing');
   const results = {};
@@ -395,6 +418,13 @@ async function bevy(shots) {
     await until('the picture', () => player.page.player.is_ready());
     await post(`bevy-${index}`, await player.inside.picture(6));
   }
+  const results = {};
+  for (const address of ['/take/index.gs4d', '/parts.gs4d']) {
+    await player.page.openAddress(address);
+    results[`the app streams ${address}`] = player.page.about.gaussians === 4000 && player.had('error').length === 0;
+    await until('the picture', () => player.page.player.is_ready());
+  }
+  await post('app-streams', results);
   // Bevy writes its adapter to the log.
   await player.close('bevy');
 }
@@ -408,6 +438,7 @@ try {
   await messages();
   await take();
   await faults();
+  await parts();
   await missing();
   for (const design of ['sort', 'bins']) await pictures(design, shots);
   await bevy(shots);

@@ -3,6 +3,7 @@
 //! In: the folder of the built page, the pictures that are wanted, captures, a function that opens an address in a browser.
 //! Out: what the page has posted, by name, once it has posted `end`; a message if it fails.
 //!
+//! `/parts.gs4d` is the index and all chunk files in one file, of which parts are sent; `/whole.gs4d` is the same without parts.
 //! The chunk files are in four folders: `/take/`, where all is well; `/slow/`, whose files of layer 1 are answered once
 //! `/slow/finer` has been asked for, and that of the last stretch once `/slow/last` has; `/flaky/`, where the first request of each chunk file fails; `/lossy/`, which lacks the
 //! first chunk file.
@@ -71,6 +72,9 @@ pub fn serve(
         files.insert(until.into(), Vec::new());
         late.extend(names.iter().map(|name| (format!("/slow/{name}"), until)));
     }
+    for name in ["/parts.gs4d", "/whole.gs4d"] {
+        files.insert(name.into(), take.one.clone());
+    }
     let (files, folder) = (Arc::new(files), folder.to_owned());
     let faults = Arc::new(Faults { late, asked: Mutex::default() });
     // The thread ends with the process of the tests.
@@ -138,17 +142,21 @@ fn answer(
     reader.read_line(&mut line).ok()?;
     let mut words = line.split_whitespace();
     let (method, path) = (words.next()?.to_owned(), words.next()?.split('?').next()?.to_owned());
-    let mut length = 0;
+    let (mut length, mut range) = (0, None);
     loop {
         let mut header = String::new();
         reader.read_line(&mut header).ok()?;
         if header.trim().is_empty() {
             break;
         }
-        if let Some((name, value)) = header.split_once(':')
-            && name.eq_ignore_ascii_case("content-length")
-        {
-            length = value.trim().parse().ok()?;
+        let Some((name, value)) = header.split_once(':') else { continue };
+        match name.to_ascii_lowercase().as_str() {
+            "content-length" => length = value.trim().parse().ok()?,
+            "range" => {
+                let (first, last) = value.trim().strip_prefix("bytes=")?.split_once('-')?;
+                range = Some((first.parse::<usize>().ok()?, last.parse::<usize>().ok()?));
+            }
+            _ => {}
         }
     }
     let mut body = vec![0; LONGEST.min(length)];
@@ -179,6 +187,10 @@ fn answer(
         Some("jpg") => "image/jpeg",
         _ => "application/octet-stream",
     };
+    if let Some((first, last)) = range.filter(|_| path == "/parts.gs4d") {
+        let end = bytes.len().min(last + 1);
+        return write(reader.get_mut(), "206 Partial Content", kind, bytes.get(first..end)?);
+    }
     write(reader.get_mut(), "200 OK", kind, &bytes)
 }
 

@@ -53,10 +53,17 @@ pub fn all(take: &Take) -> Vec<Shot> {
         let shot = shot(format!("toybox at {time}"), "/page/toybox.gs4d".into(), None, &toybox, view);
         Shot { of_app, ..shot }
     });
-    let in_files = [0.1, 0.6, 0.95].map(|time| {
+    let in_files = [
+        ("/take/index.gs4d", 0.1),
+        ("/take/index.gs4d", 0.6),
+        ("/take/index.gs4d", 0.95),
+        ("/parts.gs4d", 0.6),
+        ("/whole.gs4d", 0.6),
+    ];
+    let in_files = in_files.map(|(file, time)| {
         let camera = Camera::look_at(Vec3::new(2.0, -1.5, 1.2), Vec3::ZERO, Vec3::Z, 0.9, UVec2::new(320, 180));
         let view = camera.view(time, take.scene.trained_with.raster_fov);
-        shot(format!("chunk files at {time}"), "/take/index.gs4d".into(), None, &take.scene, view)
+        shot(format!("{file} at {time}"), file.into(), None, &take.scene, view)
     });
     goldens.chain(in_files).chain(bundled).collect()
 }

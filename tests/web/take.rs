@@ -18,6 +18,8 @@ pub struct Take {
     pub scene: RuntimeScene,
     /// The index and the files, by name.
     pub files: BTreeMap<String, Vec<u8>>,
+    /// The file of the index and all chunk files.
+    pub one: Vec<u8>,
     /// The names of the files of layer 1, and of that of layer 0 of the last stretch alone.
     pub finer: Vec<String>,
     pub last: Vec<String>,
@@ -45,7 +47,13 @@ impl Take {
         }
         assert!(parts.len() > 5, "stretches have files of their own: {:?}", parts.keys());
         let gaussian_bytes = GaussianScene::from(scene.clone()).gaussian_bytes();
-        let mut table = ChunkTable { stretches: STRETCHES, gaussian_bytes, files: Vec::new(), utilities: Vec::new() };
+        let mut table = ChunkTable {
+            stretches: STRETCHES,
+            gaussian_bytes,
+            files: Vec::new(),
+            utilities: Vec::new(),
+            first_byte: None,
+        };
         let (mut files, mut finer, mut last) = (BTreeMap::new(), Vec::new(), Vec::new());
         for (number, ((stretches, layer), own)) in parts.iter().enumerate() {
             let bytes = written(selected(&scene, own));
@@ -57,9 +65,14 @@ impl Take {
             files.insert(name, bytes);
         }
         let index = RuntimeScene { chunks: Some(table.into()), ..selected(&scene, &[]) };
+        let mut one = Vec::new();
+        let settings = WriteSettings::default();
+        package::write_index(&mut one, &index.clone().into(), &settings).expect("the index can be written");
+        // In the order of their names, which is that of the table.
+        files.values().for_each(|file| one.extend_from_slice(file));
         files.insert(ChunkTable::INDEX.to_owned(), written(index));
         assert_eq!(last.len(), 1, "the last stretch has Gaussians of its own");
-        Self { scene, files, finer, last }
+        Self { scene, files, one, finer, last }
     }
 }
 

@@ -2,7 +2,7 @@
 // In: an address, a file, bytes. Out: what there is to tell about the capture once it is shown, and about its beginning before that; the stream of a
 // capture in chunk files; progress; a sentence that says what was wrong and what to do.
 
-import { Stream } from './stream.js';
+import { Stream, partsAt } from './stream.js';
 
 // Milliseconds of a slice of loading: the page draws and answers between slices.
 const SLICE = 8;
@@ -49,7 +49,7 @@ async function unanswered(url, signal) {
     : `${url.host} does not answer: the address may be wrong, or the server is down`;
 }
 
-// Asks for an address. Returns the stream of the file and its length, 0 if it is not known.
+// Asks for an address. Returns the stream of the file, its length, 0 if it is not known, what gives parts of it, and the address.
 export async function request(address, signal) {
   let url;
   try {
@@ -64,7 +64,7 @@ export async function request(address, signal) {
   if (!response.ok) throw new Refusal(`${address} was not loaded: the server answered ${response.status} ${response.statusText}.`, true);
   // The length of a compressed answer is not that of the file.
   const length = response.headers.has('Content-Encoding') ? 0 : Number(response.headers.get('Content-Length')) || 0;
-  return { stream: response.body, length };
+  return { stream: response.body, length, parts: (signal) => partsAt(url, signal), address: url };
 }
 
 // What a beginning shows a file to be that is certainly none of a capture.
@@ -78,7 +78,8 @@ function misnomer(bytes) {
 export class Opener {
   // `report` gets the progress; `times.longestSlice` is kept.
   constructor(player, times, report) {
-    Object.assign(this, { player, times, report, own: null, stream: null });
+    // `lacksParts` is the server that sent all of a file because it sends no parts.
+    Object.assign(this, { player, times, report, own: null, stream: null, lacksParts: '' });
   }
 
   // Ends what is being opened.
@@ -120,12 +121,13 @@ export class Opener {
     this.cancel();
     const own = new AbortController();
     this.own = own;
+    this.lacksParts = '';
     try {
       this.report({ name, part: 0, bytes: 0, total: 0, state: 'receiving' });
-      const { stream, length } = await begin(own.signal);
+      const file = await begin(own.signal);
       if (own.signal.aborted) return false;
-      await this.receive(name, stream, length, own.signal, preview);
-      const found = own.signal.aborted ? null : await this.read(name, own.signal, beside, seconds);
+      const within = await this.receive(name, file, own.signal, preview);
+      const found = own.signal.aborted ? null : await this.read(name, own.signal, within ?? beside, seconds);
       if (found) shown(found);
       return Boolean(found);
     } catch (error) {
@@ -136,9 +138,13 @@ export class Opener {
     }
   }
 
-  async receive(name, stream, length, signal, preview) {
+  // Receives a file. Of an index that chunk files follow, only the index where there are parts of the file: then these are returned.
+  async receive(name, { stream, length, parts, address }, signal, preview) {
+    // Whether there are parts, once they are needed.
+    let within = null;
     const reader = stream.getReader();
     signal.addEventListener('abort', () => reader.cancel().catch(() => {}), { once: true });
+    this.player.set_address?.(address?.href);
     this.slice(() => this.player.open(name, length));
     // Bytes, and milliseconds that the page waited for them.
     let [received, waited] = [0, 0];
@@ -159,6 +165,15 @@ export class Opener {
       if (wrong) throw new Refusal(`${name} ${wrong}.`);
       this.slice(() => this.player.receive(value));
       received += value.length;
+      const index = this.player.index_length?.();
+      if (index !== undefined) within ??= parts(signal).catch(() => null);
+      if (received >= index && (await within)) {
+        if (signal.aborted) return;
+        reader.cancel().catch(() => {});
+        this.slice(() => this.player.end_at_index());
+        return within;
+      }
+      if (received >= index) this.lacksParts = address?.host ?? '';
       this.report({ name, part: length ? 0.7 * Math.min(1, received / length) : 0.35, bytes: received, total: length, state: 'receiving' });
       // A file of unknown length may take as long again.
       const left = length ? waited * (length / received - 1) : waited;

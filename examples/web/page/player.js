@@ -4,7 +4,7 @@
 import { Orbit } from './camera.js';
 import { Opener, Refusal, nameOf, request } from './files.js';
 import { at, dismiss, help, loading, refuse, say, toolbar } from './parts.js';
-import { among, beside } from './stream.js';
+import { among, beside, partsOf } from './stream.js';
 import { Quality } from './quality.js';
 import { framed, linkTo, listenAround, obedient, tell } from './around.js';
 
@@ -277,6 +277,7 @@ async function open(title, begin, again, address, near = null) {
       partial = null;
       loading(pictured === true ? null : { state: 'compiling', part: 1 });
       tell('loaded', { seconds: duration(), gaussians: about.gaussians });
+      if (opener.lacksParts) say(`${opener.lacksParts} sends no parts of files: all of the capture was loaded`);
     };
     return await opener.open(title, begin, { preview, shown, beside: near, seconds: address === undefined ? timeOfLink() ?? 0 : 0 });
   } catch (error) {
@@ -286,12 +287,14 @@ async function open(title, begin, again, address, near = null) {
   }
 }
 
-const openBytes = (title, bytes) => open(title, async () => ({ stream: new Blob([bytes]).stream(), length: bytes.length }), null, null);
+const local = (file) => async () => ({ stream: file.stream(), length: file.size, parts: async () => partsOf(file) });
+
+const openBytes = (title, bytes) => open(title, local(new Blob([bytes])), null, null);
 
 const openAddress = (address, isOfQuery = false) =>
   open(nameOf(address), (signal) => request(address, signal), () => openAddress(address, isOfQuery), isOfQuery ? undefined : address, beside(address));
 
-const openFile = (file, near = null) => file && open(file.name, async () => ({ stream: file.stream(), length: file.size }), null, null, near);
+const openFile = (file, near = null) => file && open(file.name, local(file), null, null, near);
 
 // Of several files, one is the index of the others.
 function openFiles(list) {

@@ -1,4 +1,4 @@
-// The files of a capture in chunk files: fetched as its player needs them.
+// The files of a capture in chunk files: fetched as its player needs them, whole or as parts of one file.
 // In: the player, the number of the capture in it, where the files are, what is played. Out: files in the player; whether there is a picture of a time.
 
 // Milliseconds of a frame in which files are read and uploaded.
@@ -8,7 +8,7 @@ const [NOTHING, FILE] = [0, 2];
 
 // Where files beside the index at an address are.
 export function beside(address) {
-  return async (name, signal) => {
+  return async ({ name }, signal) => {
     const response = await fetch(new URL(name, new URL(address, location.href)), { signal });
     if (!response.ok) throw new Error(`the server answered ${response.status}`);
     return response.arrayBuffer();
@@ -17,15 +17,40 @@ export function beside(address) {
 
 // The same of files of this device.
 export function among(files) {
-  return async (name) => {
+  return async ({ name }) => {
     const file = files.find((one) => one.name === name);
     if (!file) throw new Error(`there is no ${name}`);
     return file.arrayBuffer();
   };
 }
 
+// Fetches bytes `from` to `to` of the file at an address. Returns null if the server sends no parts.
+async function part(url, from, to, signal) {
+  // A browser's cache would let one request for an address wait for another.
+  const response = await fetch(url, { headers: { Range: `bytes=${from}-${to - 1}` }, cache: 'no-store', signal });
+  if (response.status === 206) return response.arrayBuffer();
+  response.body?.cancel().catch(() => {});
+  if (!response.ok) throw new Error(`the server answered ${response.status}`);
+  return null;
+}
+
+// The parts of the file at an address, once its server has sent one; null if it sends none.
+export async function partsAt(url, signal) {
+  if ((await part(url, 0, 1, signal)) === null) return null;
+  return async ({ range: [from, to] }, signal) => {
+    const bytes = await part(url, from, to, signal);
+    if (!bytes) throw new Error('the server sends no parts any more');
+    return bytes;
+  };
+}
+
+// The parts of a file of this device.
+export function partsOf(file) {
+  return async ({ range: [from, to] }) => file.slice(from, to).arrayBuffer();
+}
+
 export class Stream {
-  // `read` gives the bytes of a file by its name.
+  // `read` gives the bytes of a file by its name, or by its range in the file of the index.
   constructor(player, number, read) {
     Object.assign(this, { player, number, read, requests: new Map(), told: null });
   }
@@ -46,8 +71,8 @@ export class Stream {
   async ask(file) {
     const own = new AbortController();
     this.requests.set(file, own);
-    const name = this.player.file_name(this.number, file);
-    const bytes = await this.read(name, own.signal).catch(() => null);
+    const [name, range] = [this.player.file_name(this.number, file), this.player.file_range(this.number, file)];
+    const bytes = await this.read({ name, range }, own.signal).catch(() => null);
     // Neither the answer to a request that was given up nor its failure counts.
     if (own.signal.aborted) return;
     this.requests.delete(file);

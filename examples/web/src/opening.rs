@@ -2,9 +2,9 @@
 //!
 //! In: the name of a file and, if it is known, its length; then its bytes, piece by piece. Out: while bytes are missing,
 //! openings of the layers of a package that have been received; after some steps, a scene ready to draw; an error
-//! message for a file that cannot be read.
+//! message for a file that cannot be read. Of an index that chunk files follow, the page may receive no more than the index.
 
-use bevy_gs4d::codec::package::Beginning;
+use bevy_gs4d::codec::package::{Beginning, Following};
 use bevy_gs4d::codec::{CodecError, Loading, ReadOptions};
 use bevy_gs4d::scene::RuntimeScene;
 
@@ -27,6 +27,7 @@ struct Receiving {
     length: usize,
     bytes: Vec<u8>,
     layers: Layers,
+    following: Following,
 }
 
 /// The layers of a file that can be drawn before all of its bytes are there.
@@ -54,7 +55,8 @@ impl Opening {
         // Memory that is not written to yet costs nothing; a file that grows is copied in a step that takes long. What
         // has no room is refused when it has been received.
         let _ = bytes.try_reserve_exact(length);
-        let receiving = Receiving { name: name.to_owned(), length, bytes, layers: Layers::Unknown };
+        let (layers, following) = (Layers::Unknown, Following::Undecided);
+        let receiving = Receiving { name: name.to_owned(), length, bytes, layers, following };
         Self { state: State::Receiving(receiving), share: 1.0 }
     }
 
@@ -70,6 +72,36 @@ impl Opening {
         has_room.map_err(|_| format!("{} bytes are more than a page has memory for", bytes.len() + piece.len()))?;
         bytes.extend_from_slice(piece);
         Ok(())
+    }
+
+    /// Returns the length of the index, if chunk files follow it in the file whose bytes are being received.
+    pub fn index_length(&mut self) -> Option<u64> {
+        let State::Receiving(Receiving { bytes, following, .. }) = &mut self.state else { return None };
+        if *following == Following::Undecided {
+            *following = Following::of(bytes);
+        }
+        match following {
+            Following::From(first) => Some(*first),
+            Following::Undecided | Following::Nothing => None,
+        }
+    }
+
+    /// Ends receiving: of the file, the index alone is opened.
+    ///
+    /// # Errors
+    /// A message about a damaged index, or one that has not been received.
+    pub fn end_at_index(&mut self) -> Result<(), String> {
+        let first = self.index_length().and_then(|first| usize::try_from(first).ok());
+        match (std::mem::replace(&mut self.state, State::Empty), first) {
+            (State::Receiving(Receiving { name, mut bytes, .. }), Some(first)) => {
+                bytes.truncate(first);
+                bytes.shrink_to_fit();
+                let loading = Loading::of_index(&name, bytes, &ReadOptions::default());
+                self.state = State::Reading(Box::new(loading.map_err(|error| error.kind.to_string())?));
+                Ok(())
+            }
+            _ => Err("no index is being received".to_owned()),
+        }
     }
 
     /// Returns an opening of the layers of the file that have been received, if there are more of them than at the last

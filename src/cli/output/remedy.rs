@@ -196,6 +196,7 @@ fn of_segments(error: &AnyError) -> Option<String> {
         SegmentsError::Still { .. } => " (gs4d convert --duration)",
         SegmentsError::Overlap { .. } => "; without --keep-times, it begins then",
         SegmentsError::Speed { .. } => "; without --keep-times, it is stretched",
+        SegmentsError::Sound { .. } => " (gs4d sound --extract, then --remove), and published beside it",
         SegmentsError::ManyChunks { .. } => ": give a longer --chunk, or fewer --layers",
         _ => return None,
     };

@@ -113,6 +113,8 @@ struct ChunkFacts {
     gaussians: u64,
     /// The length of all files.
     bytes: u64,
+    /// Where the first is in the file of the index, bytes from its start; `None`: they are beside it.
+    first_byte: Option<u64>,
     /// What each layer adds to the PSNR of held-out views, dB per megabyte; empty if that was not measured.
     decibels_per_megabyte: Vec<f32>,
 }
@@ -149,14 +151,15 @@ impl Info {
         self.given.require(Need::Dataset, false)?;
         let size = file_size(&self.file)?;
         let (format, package) = codec::inspect(&self.file)?;
-        if let Some(info) = package.as_ref().filter(|info| !info.is_intact()) {
-            let (damaged, all) = (info.damaged.len(), info.header.sections.len());
-            let message = format!("{damaged} of {all} sections are damaged; copy or download the package again");
-            let failure = Failure::about(&self.file, &message);
+        if let Some((info, damage)) = package.as_ref().and_then(|info| Some((info, info.damage()?))) {
+            let failure = Failure::about(&self.file, &format!("{damage}; copy or download the package again"));
             return Ok(self.report(size, format, &Facts::of_package(info), package.as_ref(), None, Some(failure)));
         }
         let scene = self.checkpoint.load_to_describe(&self.file)?;
-        let facts = Facts::of_scene(&scene);
+        let mut facts = Facts::of_scene(&scene);
+        if let Some(info) = package.as_ref().filter(|info| info.header.chunks_follow) {
+            facts.chunks = info.header.chunks.as_ref().map(ChunkFacts::of);
+        }
         let (extent, failure) = match scene.into_runtime() {
             Ok(scene) => {
                 let TrainedWith { time_interval, marginal_cutoff, .. } = facts.trained_with;
@@ -185,8 +188,9 @@ impl Info {
         if let Some(shares) = package.and_then(shares_of_layers) {
             pairs.push(("drawn coarsely", format!("after {shares} of the file")));
         }
-        // An index is played with its chunk files.
-        let chunks = facts.chunks.as_ref().map_or(0, |chunks| chunks.bytes);
+        // An index is played with its chunk files, which may be beside it.
+        let beside = facts.chunks.as_ref().filter(|chunks| chunks.first_byte.is_none());
+        let chunks = beside.map_or(0, |chunks| chunks.bytes);
         let rate = bit_rate(size.saturating_add(chunks), &facts.playback);
         if let Some(rate) = rate {
             pairs.push(("bit rate", format!("{rate:.1} Mbit/s")));
@@ -322,12 +326,16 @@ impl Facts {
         if let Some(length) = self.sound {
             pairs.push(("sound", format!("a file of {}", bytes(length as u64))));
         }
-        if let Some(ChunkFacts { files, stretches, layers, gaussians, bytes: length, decibels_per_megabyte }) =
-            &self.chunks
-        {
+        if let Some(chunks) = &self.chunks {
+            let ChunkFacts { files, stretches, layers, gaussians, bytes: length, first_byte, decibels_per_megabyte } =
+                chunks;
             let length = bytes(*length);
             let of = format!("{gaussians} Gaussians in {layers} layers over {stretches} stretches of time, {length}");
-            pairs.push(("chunks", format!("the index of {files} chunk files: {of}")));
+            let place = match first_byte {
+                None => "the index of".to_owned(),
+                Some(first) => format!("an index of {} and", bytes(*first)),
+            };
+            pairs.push(("chunks", format!("{place} {files} chunk files: {of}")));
             let utilities: Vec<String> = decibels_per_megabyte.iter().map(|own| format!("{own:.1}")).collect();
             if !utilities.is_empty() {
                 pairs.push(("layers", format!("{} dB per MB, on held-out views", utilities.join(", "))));
@@ -373,6 +381,7 @@ impl ChunkFacts {
             layers: table.layers(),
             gaussians: table.files.iter().map(|file| file.gaussians).sum(),
             bytes: table.files.iter().map(|file| file.bytes).sum(),
+            first_byte: table.first_byte,
             decibels_per_megabyte: table.utilities.clone(),
         }
     }
@@ -450,6 +459,7 @@ fn package_json(info: &PackageInfo) -> Value {
         "generator": info.header.generator,
         "intact": info.is_intact(),
         "damaged": info.damaged,
+        "damaged_files": info.damaged_files,
         "layers": info.layers,
         "sections": info.header.sections,
     })

@@ -1,8 +1,9 @@
-//! `gs4d split IN -o FOLDER`: cuts a capture into chunk files.
+//! `gs4d split IN -o OUT`: cuts a capture into chunk files.
 //!
 //! In: a capture, the length of a stretch of time, the shares of its layers; or a packed capture, which has been cut when
 //! it was compressed; perhaps a dataset, on whose validation views layers are measured. Out: a folder with a package for
-//! each layer of each run of Gaussians that are alive in the same stretches, and an index of them; a report of the times and
+//! each layer of each run of Gaussians that are alive in the same stretches, and an index of them, or one file of the index
+//! and these packages; a report of the times and
 //! the size of each, and of the bit rates and the utilities of layers.
 
 use super::info::bit_rate;
@@ -29,6 +30,9 @@ use std::path::PathBuf;
 /// index, index.gs4d, lists the files: a player loads the index, and then the files that it needs at a time. gs4d join
 /// puts the files together again.
 ///
+/// If OUT ends with .gs4d, it is one file: the index, and all chunk files after it. A player loads the index, and then parts
+/// of the file, from a disk or a server that sends parts (byte ranges); other programs read all of it as an ordinary package.
+///
 /// A packed capture is cut as gs4d compress --chunk has ordered its Gaussians: no value changes, the files together are
 /// as small as the package, and the index has the codebooks of their colors.
 #[derive(clap::Args)]
@@ -38,6 +42,7 @@ Examples:
   gs4d split long.gs4d -o chunks --chunk 0.5 --layers 20,30,50 --json
   gs4d compress long.gs4d packed.gs4d --chunk 1 --layers 5,20,25,50
   gs4d split packed.gs4d -o chunks
+  gs4d split packed.gs4d -o stream.gs4d
   gs4d split packed.gs4d -o chunks --data data/take
   gs4d join chunks -o long.gs4d
 
@@ -50,8 +55,8 @@ pub(crate) struct SplitVerb {
     /// The checkpoint or package to read.
     #[arg(value_name = "IN")]
     input: PathBuf,
-    /// The folder to write to, which is created if it does not exist.
-    #[arg(short, long, value_name = "FOLDER")]
+    /// The folder to write to, which is created if it does not exist; or one file for all (.gs4d).
+    #[arg(short, long, value_name = "OUT")]
     out: PathBuf,
     /// Length of a stretch of time at speed 1, seconds.
     #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = values::positive)]
@@ -82,7 +87,10 @@ impl SplitVerb {
         let files = self.data.add_to(Files::default().reads_scene(&self.input));
         let index = self.out.join(ChunkTable::INDEX);
         // A wrong path is reported before the capture is read.
-        files.clone().writes_folder(&self.out, [index.clone()]).check()?;
+        match self.is_one_file() {
+            true => files.clone().writes_regular(&self.out, "gs4d").check()?,
+            false => files.clone().writes_folder(&self.out, [index.clone()]).check()?,
+        }
         let scene = CheckpointArgs::default().load_to_change(&self.input)?;
         let segment = Segment { path: self.input.clone(), scene };
         let split = match &segment.scene.form {
@@ -95,6 +103,11 @@ impl SplitVerb {
                 Split::of(&segment, stretches, &self.layers)?
             }
         };
+        if self.is_one_file() {
+            let psnrs = self.measured(&segment, &split)?;
+            let chunks = split.write_one_file(&segment, &self.out, self.level, &psnrs, &mut Bars::default())?;
+            return self.report(&segment, &chunks, &psnrs);
+        }
         let paths = split.paths(&self.out);
         if let Some(other) = other_chunks(&self.out, &paths).first() {
             let reason = "is a chunk of another split, which would be read with this one: remove it, or write to another \
@@ -103,13 +116,23 @@ impl SplitVerb {
         }
         let sound = segment.scene.sound.as_deref().map(|sound| sound_path(&self.out, sound));
         files.writes_folder(&self.out, paths.into_iter().chain([index]).chain(sound)).check()?;
-        let psnrs = if self.data.is_given() { self.measure(&segment, &split)? } else { Vec::new() };
+        let psnrs = self.measured(&segment, &split)?;
         fs::create_dir_all(&self.out).map_err(|error| Failure::at(&self.out, &error))?;
         let chunks = split.write(&segment, &self.out, self.level, &psnrs, &mut Bars::default())?;
         self.report(&segment, &chunks, &psnrs)
     }
 
-    /// Returns the PSNR of the validation views without a layer, with the first, with the first two and so on, dB.
+    /// Returns whether the index and all chunk files are to be in one file.
+    fn is_one_file(&self) -> bool {
+        self.out.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("gs4d")) && !self.out.is_dir()
+    }
+
+    /// Returns the PSNR of the validation views without a layer, with the first, with the first two and so on, dB; none if
+    /// there are no views.
+    fn measured(&self, segment: &Segment, split: &Split) -> Result<Vec<f64>, Failure> {
+        if self.data.is_given() { self.measure(segment, split) } else { Ok(Vec::new()) }
+    }
+
     fn measure(&self, segment: &Segment, split: &Split) -> Result<Vec<f64>, Failure> {
         let progress = &mut Bars::default();
         let scene = &segment.scene;
@@ -151,16 +174,18 @@ impl SplitVerb {
 
     fn report(&self, segment: &Segment, chunks: &Chunks, psnrs: &[f64]) -> Result<Report, Failure> {
         let Chunks { index, table, files } = chunks;
-        let (before, of_index) = (file_size(&self.input)?, file_size(index)?);
-        let total = table.files.iter().map(|file| file.bytes).sum::<u64>() + of_index;
+        let of_files = table.files.iter().map(|file| file.bytes).sum::<u64>();
+        let (before, of_index) = (file_size(&self.input)?, table.first_byte.map_or_else(|| file_size(index), Ok)?);
+        let total = of_files + of_index;
         let mut rows = Table::new(&["chunk", "layer", "from", "to", "Gaussians", "size"]);
         let mut listed: Vec<Value> = Vec::with_capacity(files.len());
-        for Chunk { path, times, file } in files {
-            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        for (number, Chunk { path, times, file }) in files.iter().enumerate() {
+            let name = ChunkTable::file_name(number, files.len());
             let [from, to] = times.map(|time| time.to_string());
             rows.row([name, file.layer.to_string(), from, to, file.gaussians.to_string(), bytes(file.bytes)]);
             listed.push(json!({
                 "file": path.display().to_string(),
+                "first_byte": table.range(number).map(|range| range.start),
                 "layer": file.layer,
                 "stretches": file.stretches,
                 "times": times,
@@ -173,11 +198,15 @@ impl SplitVerb {
         let rate = |layer: u32| bit_rate(of_index + table.bytes_up_to(layer), playback);
         let rates: Vec<f64> = (0..table.layers()).filter_map(rate).collect();
         let first = of_index + table.bytes_at(0, 0);
+        let (what, place) = match table.first_byte {
+            None => (format!("{} files and the index", files.len()), index.display().to_string()),
+            Some(_) => (format!("the index and {} chunk files in one file", files.len()), "the beginning".to_owned()),
+        };
         let mut facts = vec![
             ("Gaussians", segment.scene.len().to_string()),
             ("read", bytes(before)),
-            ("wrote", format!("{}, {} files and the index, {}", self.out.display(), files.len(), bytes(total))),
-            ("index", format!("{}, {}", index.display(), bytes(of_index))),
+            ("wrote", format!("{}, {what}, {}", self.out.display(), bytes(total))),
+            ("index", format!("{place}, {}", bytes(of_index))),
             ("first picture", format!("after {}: the index, and layer 0 of the first stretch", bytes(first))),
         ];
         if !rates.is_empty() {

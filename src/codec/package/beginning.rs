@@ -7,7 +7,7 @@
 use super::attribute::Attribute;
 use super::envelope;
 use super::error::PackageError;
-use super::header::{CODEBOOKS_IN_INDEX, Header, StoredForm};
+use super::header::{CHUNKS_FOLLOW, CODEBOOKS_IN_INDEX, Header, StoredForm};
 use super::section::Section;
 use crate::scene::FilterKind;
 use std::io;
@@ -124,11 +124,12 @@ fn plain(header: &Header, count: usize) -> Header {
         colliders: None,
         sound: None,
         chunks: None,
+        chunks_follow: false,
         sections: Vec::new(),
         requires: header
             .requires
             .iter()
-            .filter(|name| !["filter", CODEBOOKS_IN_INDEX].contains(&name.as_str()))
+            .filter(|name| !["filter", CODEBOOKS_IN_INDEX, CHUNKS_FOLLOW].contains(&name.as_str()))
             .cloned()
             .collect(),
         ..header.clone()

@@ -32,10 +32,10 @@ impl Header {
         scene.check().map_err(PackageError::Inconsistent)
     }
 
-    /// Checks that the sections, from `start` on, fill a file of `file_length` bytes and hold every attribute once, and
-    /// that all numbers are valid. Afterwards the sizes of [`attributes`](Self::attributes) can be allocated.
+    /// Checks that the sections, from `start` on, with the chunk files that follow fill a file of `file_length` bytes and
+    /// hold every attribute once, and that all numbers are valid. Afterwards the sizes of [`attributes`](Self::attributes) can be allocated.
     pub(super) fn check(&self, start: u64, file_length: u64) -> Result<(), PackageError> {
-        let expected = self.end(start);
+        let expected = self.length(start);
         if expected > file_length {
             return Err(PackageError::Truncated { expected, found: file_length });
         }
@@ -159,6 +159,10 @@ impl Header {
         sane(
             self.chunks.is_none() || (self.gaussians == 0 && self.levels.is_empty()),
             "the index of a capture in chunk files with Gaussians or levels of detail itself",
+        )?;
+        sane(
+            !self.chunks_follow || self.chunks.is_some(),
+            "chunk files that follow a package without a table of them",
         )?;
         let duration = self.playback.duration_seconds;
         sane(duration.is_finite() && duration >= 0.0, "the playback duration must be a finite number, zero or above")

@@ -24,7 +24,7 @@ pub(super) fn write(writer: &mut impl Write, header: &Header) -> Result<u64, Pac
     let text = header.to_text()?;
     let length = text.len() as u64;
     check_length(length)?;
-    let file_length = header.end(FIXED + length);
+    let file_length = header.length(FIXED + length);
     header.check(FIXED + length, file_length)?;
     writer.write_all(&MAGIC)?;
     writer.write_all(&VERSION.to_le_bytes())?;
@@ -44,6 +44,16 @@ pub(super) fn read(reader: &mut (impl Read + Seek)) -> Result<(Header, u64), Pac
     Ok((header, file_length))
 }
 
+/// Reads and checks the fixed start and the header of an index that chunk files follow, of which all bytes up to the first
+/// of these can be read. Also returns the length of the whole file.
+pub(super) fn read_index(reader: &mut impl Read, bytes: u64) -> Result<(Header, u64), PackageError> {
+    let (header, start) = read_header(reader, bytes)?;
+    check_file_length(header.end(start), bytes)?;
+    let file_length = header.length(start);
+    header.check(start, file_length)?;
+    Ok((header, file_length))
+}
+
 /// Reads and checks the fixed start and the header of a package whose beginning has been received. Also returns where
 /// the first section starts. `None`: there are not enough bytes.
 pub(super) fn read_beginning(bytes: &[u8]) -> Result<Option<(Header, u64)>, PackageError> {
@@ -58,7 +68,7 @@ pub(super) fn read_beginning(bytes: &[u8]) -> Result<Option<(Header, u64)>, Pack
         return Ok(None);
     }
     let (header, start) = read_header(&mut &*bytes, bytes.len() as u64)?;
-    header.check(start, header.end(start))?;
+    header.check(start, header.length(start))?;
     Ok(Some((header, start)))
 }
 
@@ -82,7 +92,12 @@ fn read_header(reader: &mut impl Read, file_length: u64) -> Result<(Header, u64)
     if checksum(&text) != stored {
         return Err(PackageError::HeaderChecksum);
     }
-    Ok((Header::parse(&text)?, FIXED + length))
+    let (mut header, start) = (Header::parse(&text)?, FIXED + length);
+    if header.chunks_follow {
+        let end = header.end(start);
+        header.chunks.iter_mut().for_each(|table| table.first_byte = Some(end));
+    }
+    Ok((header, start))
 }
 
 /// Returns the CRC-32 of everything before the first section except the checksum itself.

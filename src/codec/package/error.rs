@@ -161,6 +161,14 @@ pub enum PackageError {
         /// The cause.
         reason: Box<PackageError>,
     },
+    /// A chunk file in the file of the index, which is a package itself, cannot be read.
+    #[error("chunk file {}: {reason}", .number + 1)]
+    ChunkFile {
+        /// Its number, from 0.
+        number: usize,
+        /// The cause.
+        reason: Box<PackageError>,
+    },
     /// An option that is invalid or contradicts the stored Gaussians.
     #[error(transparent)]
     Option(#[from] InvalidOption),

@@ -10,8 +10,8 @@ use super::section::Section;
 use crate::gaussian::{Gaussian, MARGINAL_CUTOFF, Model};
 use crate::scene::packed::{COLOR_WORDS, MAX_STAGES, RECORD_WORDS};
 use crate::scene::{
-    ActiveSets, ChunkTable, ColorDegrees, FilterKind, Form, GaussianScene, PackedColors, PackedScene, PlaybackHints,
-    Runs, SceneForm, Socket, TemporalFilter, Trained, TrainedWith,
+    ActiveSets, ChunkFile, ChunkTable, ColorDegrees, FilterKind, Form, GaussianScene, PackedColors, PackedScene,
+    PlaybackHints, Runs, SceneForm, Socket, TemporalFilter, Trained, TrainedWith,
 };
 use crate::view::NEAR;
 use serde::{Deserialize, Serialize};
@@ -70,6 +70,9 @@ pub struct Header {
     /// have none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chunks: Option<ChunkTable>,
+    /// Whether the chunk files follow the last section in their order, each a package.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub chunks_follow: bool,
     /// The section table, in the order of the file.
     pub sections: Vec<Section>,
 }
@@ -148,10 +151,25 @@ pub struct StoredFilter {
 }
 
 /// Names of the features that packages of this version may require.
-const FEATURES: [&str; 7] = ["packed", "filter", "cutoff", "near", "mip_filter", "color_period", CODEBOOKS_IN_INDEX];
+const FEATURES: [&str; 8] =
+    ["packed", "filter", "cutoff", "near", "mip_filter", "color_period", CODEBOOKS_IN_INDEX, CHUNKS_FOLLOW];
 
 /// The feature of chunk files whose codebooks are in the index beside them.
 pub(super) const CODEBOOKS_IN_INDEX: &str = "codebooks_in_index";
+
+/// The feature of an index that the chunk files follow in one file.
+pub(super) const CHUNKS_FOLLOW: &str = "chunks_follow";
+
+/// What a package is to a capture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Role {
+    /// All of it, or the index beside its chunk files.
+    Whole,
+    /// A chunk file, whose codebooks are left to the index.
+    Chunk,
+    /// The index of chunk files that follow it.
+    Index,
+}
 
 /// Size of an environment map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -170,15 +188,16 @@ struct Requirements {
 }
 
 impl Header {
-    /// Returns the header of a scene, without sections. `codebooks_in_index`: whether its codebooks are left to an index.
-    pub(super) fn of(scene: &GaussianScene, codebooks_in_index: bool) -> Self {
+    /// Returns the header of a scene, without sections.
+    pub(super) fn of(scene: &GaussianScene, role: Role) -> Self {
         let form = StoredForm::of(&scene.form);
         let ColorDegrees { coefficients, degree, degree_t } = scene.form.color_degrees();
         let TrainedWith { marginal_cutoff, near, mip_filter, color_period, .. } = scene.trained_with;
         let is_packed = matches!(form, StoredForm::Packed { .. });
         let is_cut_elsewhere = marginal_cutoff != MARGINAL_CUTOFF;
         let repeats = color_period.is_some();
-        let codebooks_in_index = codebooks_in_index && form.has_codebooks();
+        let codebooks_in_index = role == Role::Chunk && form.has_codebooks();
+        let chunks_follow = role == Role::Index;
         let used = [
             is_packed,
             scene.filter.is_some(),
@@ -187,6 +206,7 @@ impl Header {
             mip_filter,
             repeats,
             codebooks_in_index,
+            chunks_follow,
         ];
         let requires = FEATURES.iter().zip(used).filter(|(_, used)| *used).map(|(name, _)| (*name).to_owned());
         Self {
@@ -219,6 +239,7 @@ impl Header {
             colliders: scene.colliders.as_deref().map(StoredColliders::of),
             sound: scene.sound.as_ref().map(|sound| sound.len()),
             chunks: scene.chunks.as_deref().cloned(),
+            chunks_follow,
             sections: Vec::new(),
         }
     }
@@ -243,6 +264,17 @@ impl Header {
     pub(super) fn end(&self, start: u64) -> u64 {
         // Each body follows its length.
         self.sections.iter().fold(start, |end, s| end.saturating_add(8).saturating_add(s.length as u64))
+    }
+
+    /// Returns the length of the file in bytes, if the first section starts at `start`: with the chunk files that follow.
+    pub(super) fn length(&self, start: u64) -> u64 {
+        self.files_that_follow().iter().fold(self.end(start), |end, file| end.saturating_add(file.bytes))
+    }
+
+    /// Returns the chunk files that follow the last section.
+    pub(super) fn files_that_follow(&self) -> &[ChunkFile] {
+        let table = self.chunks.as_ref().filter(|_| self.chunks_follow);
+        table.map(|table| table.files.as_slice()).unwrap_or_default()
     }
 
     /// Returns the attributes of a scene with these numbers, in the order in which their sections are written.

@@ -8,7 +8,8 @@
 //! (`planes`), compressed and checksummed on its own. The order is geometry and first color coefficients, layer by layer
 //! so that a [`Beginning`] of the file can be drawn, the other coefficients, temporal filter, environment map,
 //! colliders, the sound, levels of detail, each of which is a package itself. A reader skips unknown sections, and
-//! refuses a package whose header requires an unknown feature.
+//! refuses a package whose header requires an unknown feature. The chunk files of a capture, packages themselves, may follow
+//! their index in one file: a reader that has all of it reads the capture, a player reads the index and then parts.
 
 mod attribute;
 mod beginning;
@@ -37,7 +38,7 @@ use super::options::ReadOptions;
 use crate::scene::{ChunkTable, ColorCodebooks, GaussianScene};
 use attribute::Attribute;
 use colliders::ColliderWords;
-use header::LEVEL;
+use header::{LEVEL, Role};
 use memory_limit::{MemoryLimit, of_level};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -82,12 +83,24 @@ pub struct PackageInfo {
     pub layers: Vec<usize>,
     /// Indices in `header.sections` of the sections with a wrong checksum or length.
     pub damaged: Vec<usize>,
+    /// Numbers, from 0, of the chunk files that follow and are damaged.
+    pub damaged_files: Vec<usize>,
 }
 
 impl PackageInfo {
     /// Returns whether every checksum is correct.
     pub fn is_intact(&self) -> bool {
-        self.damaged.is_empty()
+        self.damaged.is_empty() && self.damaged_files.is_empty()
+    }
+
+    /// Returns what is damaged, in words; `None` if every checksum is correct.
+    pub fn damage(&self) -> Option<String> {
+        let (files, sections) = (self.header.files_that_follow().len(), self.header.sections.len());
+        match (self.damaged.len(), self.damaged_files.len()) {
+            (0, 0) => None,
+            (0, damaged) => Some(format!("{damaged} of {files} chunk files are damaged")),
+            (damaged, _) => Some(format!("{damaged} of {sections} sections are damaged")),
+        }
     }
 }
 
@@ -98,7 +111,7 @@ impl PackageInfo {
 /// [`PackageError::Inconsistent`] for a scene whose parts do not fit together, [`PackageError::TooLarge`] for a scene
 /// that compresses so well that a reader would refuse it as a decompression bomb, and errors of the writer.
 pub fn write<W: Write>(writer: W, scene: &GaussianScene, settings: &WriteSettings) -> Result<(), PackageError> {
-    write_with(writer, scene, settings, false)
+    write_with(writer, scene, settings, Role::Whole)
 }
 
 /// As [`write`], of a chunk file: the codebooks of its colors are left to the index of the capture.
@@ -110,16 +123,24 @@ pub(crate) fn write_chunk<W: Write>(
     scene: &GaussianScene,
     settings: &WriteSettings,
 ) -> Result<(), PackageError> {
-    write_with(writer, scene, settings, true)
+    write_with(writer, scene, settings, Role::Chunk)
+}
+
+/// As [`write`], of the index of a capture whose chunk files, in the order of its table, are to be written right after it.
+///
+/// # Errors
+/// As [`write`].
+pub fn write_index<W: Write>(writer: W, scene: &GaussianScene, settings: &WriteSettings) -> Result<(), PackageError> {
+    write_with(writer, scene, settings, Role::Index)
 }
 
 fn write_with<W: Write>(
     mut writer: W,
     scene: &GaussianScene,
     settings: &WriteSettings,
-    codebooks_in_index: bool,
+    role: Role,
 ) -> Result<(), PackageError> {
-    let mut header = Header::of(scene, codebooks_in_index);
+    let mut header = Header::of(scene, role);
     let colliders = scene.colliders.as_deref().map(ColliderWords::of).unwrap_or_default();
     header.check_writable(scene, &colliders)?;
     let level = settings.level.clamp(1, 19);
@@ -228,21 +249,60 @@ fn codebooks_beside(beside: &dyn Beside) -> Result<Arc<ColorCodebooks>, PackageE
     index.form.codebooks().cloned().ok_or_else(|| unusable("which has no codebooks".to_owned()))
 }
 
+/// Whether chunk files follow an index in one file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Following {
+    /// Further bytes decide.
+    Undecided,
+    /// None do, or the file is no package that can be read.
+    Nothing,
+    /// They do, from this byte on, counted from the start of the file.
+    From(u64),
+}
+
+impl Following {
+    /// Returns whether chunk files follow, by the first bytes of a file.
+    pub fn of(bytes: &[u8]) -> Self {
+        match envelope::read_beginning(bytes) {
+            Ok(None) => Self::Undecided,
+            Ok(Some((header, start))) if header.chunks_follow => Self::From(header.end(start)),
+            Ok(Some(_)) | Err(_) => Self::Nothing,
+        }
+    }
+}
+
 /// Reads the header and verifies every checksum, without building the scene.
 ///
 /// # Errors
 /// As [`read`], but damaged sections are listed in the result instead.
 pub fn inspect<R: Read + Seek>(reader: R) -> Result<PackageInfo, PackageError> {
     let mut reader = BufReader::new(reader);
-    let (header, file_length) = envelope::read(&mut reader)?;
+    let (header, file_length, damaged) = inspect_sections(&mut reader)?;
+    let (mut body, mut damaged_files) = (Vec::new(), Vec::new());
+    for (number, file) in header.files_that_follow().iter().enumerate() {
+        body.clear();
+        Read::by_ref(&mut reader).take(file.bytes).read_to_end(&mut body)?;
+        let is_intact = inspect_sections(&mut Cursor::new(&body))
+            .is_ok_and(|(header, _, damaged)| header.chunks.is_none() && damaged.is_empty());
+        if !is_intact {
+            damaged_files.push(number);
+        }
+    }
+    let layers = Beginning::of_header(&header, file_length - header.length(0)).layers().to_vec();
+    Ok(PackageInfo { version: VERSION, file_length, header, layers, damaged, damaged_files })
+}
+
+/// Reads the header and verifies the checksum of every section. Returns the header, the length of the file and the indices
+/// of the damaged sections.
+fn inspect_sections(reader: &mut (impl Read + Seek)) -> Result<(Header, u64, Vec<usize>), PackageError> {
+    let (header, file_length) = envelope::read(reader)?;
     let (mut body, mut damaged) = (Vec::new(), Vec::new());
     for (index, section) in header.sections.iter().enumerate() {
-        match section.read_body(&mut reader, &mut body) {
+        match section.read_body(reader, &mut body) {
             Ok(()) => {}
             Err(PackageError::SectionChecksum { .. } | PackageError::SectionLength { .. }) => damaged.push(index),
             Err(other) => return Err(other),
         }
     }
-    let layers = Beginning::of_header(&header, file_length - header.end(0)).layers().to_vec();
-    Ok(PackageInfo { version: VERSION, file_length, header, layers, damaged })
+    Ok((header, file_length, damaged))
 }

@@ -1,18 +1,20 @@
 //! Reading a package in steps, so that a program can do other work between them.
 //!
 //! In: a reader that contains a package and nothing else. Out: after any number of steps, its scene. A step allocates a
-//! piece of the scene, reads a piece of a section, decompresses one, or writes one into the scene.
+//! piece of the scene, reads a piece of a section, decompresses one, or writes one into the scene. Of an index that chunk
+//! files follow, the scene is the capture of these, or the index alone.
 
 use super::attribute::Attribute;
 use super::colliders::ColliderWords;
 use super::envelope;
 use super::error::PackageError;
 use super::header::{Header, LEVEL};
-use super::memory_limit::{MemoryLimit, of_level};
+use super::memory_limit::{MemoryLimit, of_chunk, of_level};
 use super::section::{Body, Section};
 use super::{layout, options, planes};
 use crate::codec::options::ReadOptions;
 use crate::codec::zstd_frames::{Decoder, Memory};
+use crate::scene::union::{Union, Unlike};
 use crate::scene::{ColorCodebooks, Form, GaussianScene, Level, PackedColors, RuntimeScene, SceneForm};
 use std::io::{BufReader, Cursor, Read, Seek};
 use std::sync::Arc;
@@ -22,9 +24,14 @@ pub(crate) struct Reading<R> {
     reader: BufReader<R>,
     limit: MemoryLimit,
     sections: Sections,
-    /// The level of detail that is being read, and those that have been.
-    level: Option<(Cursor<Vec<u8>>, Sections)>,
+    /// The package within the file that is being read: a level of detail, or a chunk file that follows an index.
+    part: Option<(Cursor<Vec<u8>>, Sections)>,
+    /// The levels of detail that have been read.
     levels: Vec<RuntimeScene>,
+    /// Whether the index alone is read, the number of chunk files that have been read, and the capture of them.
+    is_index: bool,
+    files: usize,
+    union: Option<Union>,
 }
 
 /// The sections of a package, without levels of detail, of which some have been read.
@@ -72,8 +79,24 @@ impl<R: Read + Seek> Reading<R> {
     pub(crate) fn new(reader: R) -> Result<Self, PackageError> {
         let mut reader = BufReader::new(reader);
         let (header, file_length) = envelope::read(&mut reader)?;
+        Ok(Self::of(reader, header, file_length, false))
+    }
+
+    /// Reads the header of an index that chunk files follow, of which the reader has `bytes` bytes: all up to the first of
+    /// these. The scene is the index alone.
+    ///
+    /// # Errors
+    /// A damaged header.
+    pub(crate) fn of_index(reader: R, bytes: u64) -> Result<Self, PackageError> {
+        let mut reader = BufReader::new(reader);
+        let (header, file_length) = envelope::read_index(&mut reader, bytes)?;
+        Ok(Self::of(reader, header, file_length, true))
+    }
+
+    fn of(reader: BufReader<R>, header: Header, file_length: u64, is_index: bool) -> Self {
         let limit = MemoryLimit::of(&header, file_length);
-        Ok(Self { reader, limit, sections: Sections::new(header), level: None, levels: Vec::new() })
+        let (part, levels, files, union) = Default::default();
+        Self { reader, limit, sections: Sections::new(header), part, levels, is_index, files, union }
     }
 
     /// Does one step, which decompresses or writes about `bytes` at most. Returns whether there is more to do.
@@ -82,11 +105,19 @@ impl<R: Read + Seek> Reading<R> {
     /// A damaged section.
     pub(crate) fn advance(&mut self, bytes: usize) -> Result<bool, PackageError> {
         let index = self.levels.len();
-        if let Some((body, sections)) = &mut self.level {
-            if matches!(sections.advance(body, bytes).map_err(of_level(index))?, Step::None)
-                && let Some((_, sections)) = self.level.take()
+        if let Some((body, sections)) = &mut self.part {
+            let number = Some(self.files).filter(|_| self.sections.header.chunks_follow);
+            let within = |error| match number {
+                Some(number) => of_chunk(number)(error),
+                None => of_level(index)(error),
+            };
+            if matches!(sections.advance(body, bytes).map_err(within)?, Step::None)
+                && let Some((_, sections)) = self.part.take()
             {
-                self.levels.push(sections.into_level().map_err(of_level(index))?);
+                match number {
+                    Some(_) => self.unite(sections).map_err(within)?,
+                    None => self.levels.push(sections.into_level().map_err(within)?),
+                }
             }
             return Ok(true);
         }
@@ -96,11 +127,47 @@ impl<R: Read + Seek> Reading<R> {
                 let (header, start) = self.limit.header_of_level(&body).map_err(of_level(index))?;
                 let mut body = Cursor::new(body);
                 body.set_position(start);
-                self.level = Some((body, Sections::new(header)));
+                self.part = Some((body, Sections::new(header)));
                 Ok(true)
             }
-            Step::None => Ok(false),
+            Step::None => self.begin_file().map_err(of_chunk(self.files)),
         }
+    }
+
+    /// Begins to read the next chunk file. Returns whether there is one.
+    fn begin_file(&mut self) -> Result<bool, PackageError> {
+        let files = self.sections.header.files_that_follow();
+        let Some(file) = files.get(self.files).filter(|_| !self.is_index) else { return Ok(false) };
+        // The header was checked against the length of the file.
+        let mut body = Vec::new();
+        Read::by_ref(&mut self.reader).take(file.bytes).read_to_end(&mut body)?;
+        let (header, start) = self.limit.header_of_chunk(&body, file)?;
+        let mut body = Cursor::new(body);
+        body.set_position(start);
+        self.part = Some((body, Sections::new(header)));
+        Ok(true)
+    }
+
+    /// Appends a chunk file of which all sections have been read.
+    fn unite(&mut self, sections: Sections) -> Result<(), PackageError> {
+        let needs_codebooks = sections.header.codebooks_in_index;
+        let mut scene = sections.into_scene();
+        if needs_codebooks {
+            supply(&mut scene, self.sections.scene.form.codebooks())?;
+        }
+        scene.check().map_err(PackageError::Inconsistent)?;
+        self.files += 1;
+        let Some(all) = &mut self.union else {
+            self.union = Some(Union::new(scene));
+            return Ok(());
+        };
+        all.append(scene).map_err(|unlike| {
+            PackageError::Inconsistent(match unlike {
+                Unlike::Settings => "it has other settings than the first",
+                Unlike::Form => "its Gaussians have another form than those of the first",
+                Unlike::Filter => "it has another temporal filter than the first",
+            })
+        })
     }
 
     /// Returns the part of the sections that has been read, 0 to 1.
@@ -113,6 +180,8 @@ impl<R: Read + Seek> Reading<R> {
             let section = header.sections.get(begun.section)?;
             Some(length(section) * (1.0 - planes.len() as f64 / section.raw_length.max(1) as f64))
         });
+        let files = header.files_that_follow().iter().filter(|_| !self.is_index).map(|file| file.bytes as f64);
+        let (all, read) = (all + files.clone().sum::<f64>(), read + files.take(self.files).sum::<f64>());
         ((read - left.unwrap_or(0.0)) / all.max(1.0)) as f32
     }
 
@@ -131,7 +200,11 @@ impl<R: Read + Seek> Reading<R> {
         if self.needs_codebooks() {
             supply(&mut self.sections.scene, codebooks)?;
         }
-        let Self { mut sections, levels, .. } = self;
+        let Self { mut sections, levels, union, .. } = self;
+        if let Some(scene) = union.map(Union::finish) {
+            scene.check().map_err(PackageError::Inconsistent)?;
+            return Ok(scene);
+        }
         let sized = std::mem::take(&mut sections.header.levels).into_iter().zip(levels);
         let levels = sized.map(|(stored, scene)| Level { pixels: stored.pixels, scene: Arc::new(scene) }).collect();
         let scene = GaussianScene { levels, ..sections.into_scene() };

@@ -393,7 +393,8 @@ mod tests {
             let duration = f64::from(random.in_range(-0.1, 3.0));
             let stretches = 1 + random.below(500) as u32;
             let seconds = f64::from(random.in_range(-1.0, 4.0));
-            let table = ChunkTable { stretches, gaussian_bytes: 1, files: Vec::new(), utilities: Vec::new() };
+            let table =
+                ChunkTable { stretches, gaussian_bytes: 1, files: Vec::new(), utilities: Vec::new(), first_byte: None };
             let [own, of_table] =
                 [Axis::new(duration, stretches).stretch_at(seconds), table.stretch_at(seconds, duration)];
             assert_eq!(own, of_table, "{seconds} s of {duration} s in {stretches} stretches");

@@ -9,7 +9,13 @@ use crate::scene::{ChunkFile, ChunkTable};
 /// Returns a table of files, each its stretches, its layer and its bytes on the GPU, which are also those of the file.
 pub(super) fn table(stretches: u32, files: &[([u32; 2], u32, u64)]) -> ChunkTable {
     let file = |&(stretches, layer, bytes)| ChunkFile { stretches, layer, gaussians: bytes, bytes };
-    ChunkTable { stretches, gaussian_bytes: 1, files: files.iter().map(file).collect(), utilities: Vec::new() }
+    ChunkTable {
+        stretches,
+        gaussian_bytes: 1,
+        files: files.iter().map(file).collect(),
+        utilities: Vec::new(),
+        first_byte: None,
+    }
 }
 
 /// Returns a player at a time, with a velocity, in a range of any end.

@@ -56,7 +56,13 @@ fn random_table(random: &mut Random) -> ChunkTable {
     });
     let files = files.collect();
     let utilities = (0..random.below(4)).map(|_| random.in_range(-1.0, 8.0)).collect();
-    ChunkTable { stretches: stretches as u32, gaussian_bytes: 1 + random.below(80) as u32, files, utilities }
+    ChunkTable {
+        stretches: stretches as u32,
+        gaussian_bytes: 1 + random.below(80) as u32,
+        files,
+        utilities,
+        first_byte: None,
+    }
 }
 
 impl Host {

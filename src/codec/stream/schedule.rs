@@ -40,7 +40,7 @@ pub struct StreamPlan {
 /// // One file of all the time, and one for each of four stretches of 2 seconds.
 /// let file = |first, last| ChunkFile { stretches: [first, last], layer: 0, gaussians: 1000, bytes: 24_000 };
 /// let files = vec![file(0, 3), file(0, 0), file(1, 1), file(2, 2), file(3, 3)];
-/// let table = ChunkTable { stretches: 4, gaussian_bytes: 80, files, utilities: Vec::new() };
+/// let table = ChunkTable { stretches: 4, gaussian_bytes: 80, files, utilities: Vec::new(), first_byte: None };
 /// let mut schedule = StreamSchedule::new(table.into(), 8.0);
 ///
 /// let head = Playhead { seconds: 3.0, velocity: 1.0, range: [0.0, 8.0], turn: Turn::Loop, delay: 0.0 };

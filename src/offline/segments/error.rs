@@ -152,6 +152,12 @@ pub enum SegmentsError {
         /// Number of chunk files.
         found: usize,
     },
+    /// A sound, which players of one file would have to read before the first picture.
+    #[error("{}: carries a sound, which would delay the first picture: in one file it has to be left out", .path.display())]
+    Sound {
+        /// The capture.
+        path: PathBuf,
+    },
     /// A chunk that is not there.
     #[error("{}: its chunk {name} is missing: all chunks of a capture are needed", .folder.display())]
     Missing {

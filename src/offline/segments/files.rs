@@ -4,9 +4,12 @@
 //! folder is named or each of them. The index beside them is no segment.
 
 use super::error::SegmentsError;
+use crate::codec::package::Following;
 use crate::offline::work::FileError;
 use crate::scene::ChunkTable;
 use std::collections::BTreeSet;
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// A capture to read.
@@ -16,7 +19,7 @@ pub struct Source {
     pub path: PathBuf,
     /// The file, or all chunks in order.
     pub files: Vec<PathBuf>,
-    /// Whether the files are chunks.
+    /// Whether the files are chunks, or the one file has an index and all chunks.
     pub is_split: bool,
 }
 
@@ -43,7 +46,7 @@ pub fn sources(paths: &[PathBuf]) -> Result<Vec<Source>, SegmentsError> {
             _ if !chunks.is_empty() => path.clone(),
             Some(_) => path.parent().unwrap_or(Path::new("")).to_owned(),
             None => {
-                sources.push(Source { path: path.clone(), files: vec![path.clone()], is_split: false });
+                sources.push(Source { path: path.clone(), files: vec![path.clone()], is_split: is_one_file(path) });
                 continue;
             }
         };
@@ -56,7 +59,7 @@ pub fn sources(paths: &[PathBuf]) -> Result<Vec<Source>, SegmentsError> {
             None => sources.push(Source { path: folder, files: chunks, is_split: true }),
         }
     }
-    for source in sources.iter_mut().filter(|source| source.is_split) {
+    for source in sources.iter_mut().filter(|source| source.is_split && source.files != [source.path.as_path()]) {
         source.files.sort_by_key(|file| chunk_number(file));
         check_complete(source)?;
     }
@@ -67,6 +70,20 @@ pub fn sources(paths: &[PathBuf]) -> Result<Vec<Source>, SegmentsError> {
 fn is_index_of(path: &Path, paths: &[PathBuf]) -> bool {
     let is_beside = |other: &PathBuf| chunk_number(other).is_some() && other.parent() == path.parent();
     path.file_name().is_some_and(|name| name == ChunkTable::INDEX) && paths.iter().any(is_beside)
+}
+
+/// Returns whether a file has an index that all chunks follow. A file that cannot be read is none: reading it says why.
+fn is_one_file(path: &Path) -> bool {
+    let Ok(mut file) = File::open(path) else { return false };
+    let (mut bytes, mut step) = (Vec::new(), 1 << 16);
+    loop {
+        let read = Read::by_ref(&mut file).take(step).read_to_end(&mut bytes);
+        match Following::of(&bytes) {
+            Following::From(_) => return true,
+            Following::Undecided if read.is_ok_and(|read| read > 0) => step *= 2,
+            Following::Undecided | Following::Nothing => return false,
+        }
+    }
 }
 
 /// Returns the chunk files in a folder.

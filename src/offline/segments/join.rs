@@ -7,10 +7,11 @@
 use super::alike::{color_period, require_alike};
 use super::clock::{Grid, Place, Span, following, grid, own};
 use super::error::{SegmentsError, Shared};
-use super::forms::{append, move_form};
+use super::forms::move_form;
 use super::segment::Segment;
 use super::windows::{Frame, windows};
 use crate::offline::work::{FileError, Progress, proceed};
+use crate::scene::union::append;
 use crate::scene::{
     ActiveSets, FilterKind, GaussianScene, Origin, PlaybackHints, SceneForm, TemporalFilter, TrainedWith,
 };

@@ -8,7 +8,7 @@
 //! |---|---|
 //! | `clock` | where each segment begins on the clock of all, and the segments of the filter |
 //! | `windows` | the filter segments in which each Gaussian may be drawn |
-//! | `forms` | Gaussians are moved in time and space, and appended |
+//! | `forms` | Gaussians are moved in time and space |
 //! | `alike` | what segments must have in common |
 //! | `join` | one capture of segments |
 //! | `files` | the names of chunk files, and which paths are chunks of one capture |

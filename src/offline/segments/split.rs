@@ -2,7 +2,8 @@
 //!
 //! In: a capture, and how it is cut; a packed capture has been cut when it was compressed. Out: a file for each layer of each run of
 //! Gaussians: a capture with the clock of the whole, of which any player shows what it has. Together they are the whole
-//! capture: see `unite`. The index beside them has everything but the Gaussians, and the table of the files.
+//! capture: see `unite`. The index beside them, or before them in one file, has everything but the Gaussians, and the table
+//! of the files.
 
 use super::error::SegmentsError;
 use super::files::chunks_in;
@@ -10,7 +11,8 @@ use super::layers::LayerShares;
 use super::parts::{LEAST, lives, parts};
 use super::segment::Segment;
 use super::sound_beside::write_sound;
-use crate::offline::work::{FileError, Progress, proceed, save, save_chunk, write_settings};
+use crate::codec::package;
+use crate::offline::work::{FileError, Progress, proceed, save, save_chunk, save_one_file, write_settings};
 use crate::scene::packed::runs::Part;
 use crate::scene::{ChunkFile, ChunkTable, FilterKind, Form, GaussianScene, PackedScene, RunPart, Runs, SceneForm};
 use std::collections::HashSet;
@@ -22,7 +24,7 @@ use std::sync::Arc;
 /// A chunk file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chunk {
-    /// The file.
+    /// The file, or the one file of all.
     pub path: PathBuf,
     /// The times between which its Gaussians are alive, timestamp units.
     pub times: [f64; 2],
@@ -33,7 +35,7 @@ pub struct Chunk {
 /// The files of a capture that has been cut.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chunks {
-    /// The index.
+    /// The index, or the file of the index and all chunk files.
     pub index: PathBuf,
     /// The table of the index.
     pub table: ChunkTable,
@@ -135,38 +137,91 @@ impl Split {
         let (index, settings) = (folder.join(ChunkTable::INDEX), write_settings(&segment.scene.form, level));
         remove_index(&index)?;
         let mut files = Vec::with_capacity(self.parts.len());
-        for (part, path) in self.parts.iter().zip(self.paths(folder)) {
+        for (number, path) in self.paths(folder).into_iter().enumerate() {
             proceed(progress)?;
-            let mut scene = segment.scene.select(&part.gaussians);
-            // All chunks have one environment map, and the same sockets and colliders, in the first file.
-            scene.environment = scene.environment.filter(|_| files.is_empty());
-            if !files.is_empty() {
-                scene.sockets.clear();
-                scene.colliders = None;
-            }
-            scene.sound = None;
-            save_chunk(&path, &scene, &settings)?;
+            save_chunk(&path, &self.chunk(&segment.scene, number), &settings)?;
             let bytes = fs::metadata(&path).map_err(|error| FileError::at(&path, error))?.len();
-            let Part { stretches, layer, ref gaussians } = *part;
-            let file = ChunkFile { stretches, layer, gaussians: gaussians.len() as u64, bytes };
-            files.push(Chunk { path, times: self.times(&segment.scene, stretches), file });
+            files.push(self.written(&segment.scene, number, path, bytes));
             progress.advance();
         }
         proceed(progress)?;
-        let files_of = || files.iter().map(|chunk| chunk.file);
-        let table = ChunkTable {
-            stretches: self.stretches,
-            gaussian_bytes: segment.scene.gaussian_bytes(),
-            files: files_of().collect(),
-            utilities: utilities(psnrs, files_of()),
-        };
+        let table = self.table(&segment.scene, &files, psnrs);
         write_sound(folder, segment.scene.sound.as_deref())?;
-        let chunks = Some(Arc::new(table.clone()));
-        let scene = GaussianScene { filter: None, sound: None, chunks, ..segment.scene.select(&[]) };
-        save(&index, &scene, &settings)?;
+        save(&index, &index_of(&segment.scene, &table), &settings)?;
         progress.advance();
         progress.finish();
         Ok(Chunks { index, table, files })
+    }
+
+    /// Writes the index of the capture and its chunk files after it into one file, of which players read parts. Until the
+    /// file is written, all chunk files are in memory, compressed. For `level` and `psnrs` see [`write`](Self::write), which
+    /// also begins this task.
+    ///
+    /// # Errors
+    /// A capture with a sound, which players would have to read before the first picture; a file that cannot be written, an
+    /// interruption.
+    pub fn write_one_file(
+        &self,
+        segment: &Segment,
+        path: &Path,
+        level: Option<i32>,
+        psnrs: &[f64],
+        progress: &mut dyn Progress,
+    ) -> Result<Chunks, SegmentsError> {
+        if segment.scene.sound.is_some() {
+            return Err(SegmentsError::Sound { path: segment.path.clone() });
+        }
+        progress.begin("writing", self.parts.len() + 1);
+        let settings = write_settings(&segment.scene.form, level);
+        let (mut files, mut bodies) = (Vec::with_capacity(self.parts.len()), Vec::with_capacity(self.parts.len()));
+        for number in 0..self.parts.len() {
+            proceed(progress)?;
+            let mut body = Vec::new();
+            let written = package::write_chunk(&mut body, &self.chunk(&segment.scene, number), &settings);
+            written.map_err(|error| FileError::at(path, error))?;
+            files.push(self.written(&segment.scene, number, path.to_owned(), body.len() as u64));
+            bodies.push(body);
+            progress.advance();
+        }
+        proceed(progress)?;
+        let table = self.table(&segment.scene, &files, psnrs);
+        save_one_file(path, &index_of(&segment.scene, &table), &bodies, &settings)?;
+        let length = fs::metadata(path).map_err(|error| FileError::at(path, error))?.len();
+        let first_byte = Some(length - files.iter().map(|chunk| chunk.file.bytes).sum::<u64>());
+        progress.advance();
+        progress.finish();
+        Ok(Chunks { index: path.to_owned(), table: ChunkTable { first_byte, ..table }, files })
+    }
+
+    /// Returns the scene of a chunk file.
+    fn chunk(&self, scene: &GaussianScene, number: usize) -> GaussianScene {
+        let mut chunk = scene.select(self.parts.get(number).map(|part| part.gaussians.as_slice()).unwrap_or_default());
+        // All chunks have one environment map, and the same sockets and colliders, in the first file.
+        if number > 0 {
+            chunk.environment = None;
+            chunk.sockets.clear();
+            chunk.colliders = None;
+        }
+        GaussianScene { sound: None, ..chunk }
+    }
+
+    /// Returns what is known of a chunk file that has been written.
+    fn written(&self, scene: &GaussianScene, number: usize, path: PathBuf, bytes: u64) -> Chunk {
+        let Part { stretches, layer, ref gaussians } = self.parts[number];
+        let file = ChunkFile { stretches, layer, gaussians: gaussians.len() as u64, bytes };
+        Chunk { path, times: self.times(scene, stretches), file }
+    }
+
+    /// Returns the table of files beside their index.
+    fn table(&self, scene: &GaussianScene, files: &[Chunk], psnrs: &[f64]) -> ChunkTable {
+        let files = || files.iter().map(|chunk| chunk.file);
+        ChunkTable {
+            stretches: self.stretches,
+            gaussian_bytes: scene.gaussian_bytes(),
+            files: files().collect(),
+            utilities: utilities(psnrs, files()),
+            first_byte: None,
+        }
     }
 
     /// Returns the times between which Gaussians of these stretches are alive, timestamp units.
@@ -175,6 +230,12 @@ impl Split {
         let time = |stretch: u32| first + (last - first) * f64::from(stretch) / f64::from(self.stretches);
         [time(stretches[0]), time(stretches[1] + 1)]
     }
+}
+
+/// Returns the index of a capture in chunk files.
+fn index_of(scene: &GaussianScene, table: &ChunkTable) -> GaussianScene {
+    let chunks = Some(Arc::new(table.clone()));
+    GaussianScene { filter: None, sound: None, chunks, ..scene.select(&[]) }
 }
 
 /// Returns the utility of each layer, dB per megabyte of its files, given the PSNR without a layer, with the first, with the

@@ -24,4 +24,4 @@ pub use interrupted::Interrupted;
 pub(crate) use progress::proceed;
 pub use progress::{NoProgress, Progress};
 pub use save::save;
-pub(crate) use save::{save_chunk, write_beside, write_png, write_settings};
+pub(crate) use save::{save_chunk, save_one_file, write_beside, write_png, write_settings};

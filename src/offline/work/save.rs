@@ -39,6 +39,24 @@ pub(crate) fn save_chunk(path: &Path, scene: &GaussianScene, settings: &WriteSet
     temporary_file::replace(part.into_iter().collect())
 }
 
+/// Writes an index and the bytes of its chunk files, in the order of its table, into one file, as [`save`] does.
+///
+/// # Errors
+/// As [`save`].
+pub(crate) fn save_one_file(
+    path: &Path,
+    index: &GaussianScene,
+    files: &[Vec<u8>],
+    settings: &WriteSettings,
+) -> Result<(), CodecError> {
+    let write = |writer: &mut BufWriter<File>| -> Result<(), CodecErrorKind> {
+        package::write_index(&mut *writer, index, settings)?;
+        Ok(files.iter().try_for_each(|file| writer.write_all(file))?)
+    };
+    let part = part(path, write, |file| read_back(package::read(file)))?;
+    temporary_file::replace(part.into_iter().collect())
+}
+
 /// Checks that a package that was just written can be read.
 fn read_back(read: Result<GaussianScene, PackageError>) -> Result<(), CodecErrorKind> {
     match read {

@@ -3,13 +3,14 @@
 //! In: the bytes of a file of any format, the other files of its folder that it needs, and [`CaptureLoaderSettings`].
 //! Out: a [`GaussianCapture`], or a [`CaptureLoadError`], to which Bevy adds the path.
 
+use super::one_file::{PartSources, ReadFile, read_file};
 use super::pause::Pauses;
 use crate::codec::format::extensions;
 use crate::codec::{CodecError, CodecErrorKind, ImportError, Loading, ReadOptions};
 use crate::plugin::component::GaussianCapture;
 use bevy::asset::io::{AssetReaderError, Reader};
 use bevy::asset::{AssetLoader, AssetPath, LoadContext, ReadAssetBytesError, RenderAssetUsages};
-use bevy::log::info;
+use bevy::log::{info, warn};
 use bevy::reflect::TypePath;
 use serde::{Deserialize, Serialize};
 use std::io::{Error, ErrorKind};
@@ -106,9 +107,22 @@ pub struct CaptureLoaderSettings {
 /// `cfg_args`, the file that the trainer writes into the folder of its checkpoints, for what the settings do not say.
 ///
 /// What the capture does not show of its file, and settings that have no effect on it, are logged.
-#[derive(Debug, Default, Clone, Copy, TypePath)]
+///
+/// An index that chunk files follow in one file is loaded alone where its source can give parts of files: files of a disk, and
+/// servers through [`HttpRangesPlugin`](crate::stream::HttpRangesPlugin). From other sources all of the file is loaded, which
+/// is logged.
+#[derive(Debug, Default, Clone, TypePath)]
 #[type_path = "bevy_gs4d::asset"]
-pub struct CaptureLoader;
+pub struct CaptureLoader {
+    sources: PartSources,
+}
+
+impl CaptureLoader {
+    /// Returns the loader of an app whose sources give parts of files as noted.
+    pub(super) fn of(sources: PartSources) -> Self {
+        Self { sources }
+    }
+}
 
 impl AssetLoader for CaptureLoader {
     type Asset = GaussianCapture;
@@ -121,21 +135,26 @@ impl AssetLoader for CaptureLoader {
         settings: &CaptureLoaderSettings,
         context: &mut LoadContext<'_>,
     ) -> Result<GaussianCapture, CaptureLoadError> {
-        let mut bytes = Vec::new();
-        reader.read_to_end(&mut bytes).await?;
-        let mut loading = Loading::new(context.path().path(), bytes, &settings.read)?;
-        let mut pauses = Pauses::default();
-        loop {
-            if let Some(name) = loading.wanted() {
-                let file = read_beside(context, name).await;
-                loading.supply(file);
-            } else if !loading.advance(Loading::STEP)? {
-                break;
+        let (path, options) = (context.path().path().to_owned(), &settings.read);
+        let mut loading = match read_file(reader, context.path().source(), &self.sources).await? {
+            ReadFile::Index(bytes) => Loading::of_index(&path, bytes, options)?,
+            ReadFile::Whole(bytes) => Loading::new(&path, bytes, options)?,
+            ReadFile::WithoutParts(bytes) => {
+                warn!(
+                    "{}: its server or source gives no parts of files, so that all {} bytes have been loaded: it is played \
+                     whole. Over http and https, HttpRangesPlugin reads parts, if the server does",
+                    context.path(),
+                    bytes.len()
+                );
+                Loading::new(&path, bytes, options)?
             }
-            pauses.after_step().await;
+        };
+        while let Some(name) = load_in_steps(&mut loading).await? {
+            let file = read_beside(context, &name).await;
+            loading.supply(file);
         }
         for sentence in loading.lost() {
-            info!("{}: {sentence}", context.path().path().display());
+            info!("{}: {sentence}", path.display());
         }
         Ok(GaussianCapture::new(loading.finish()?).with_usages(settings.asset_usage))
     }
@@ -143,6 +162,20 @@ impl AssetLoader for CaptureLoader {
     fn extensions(&self) -> &[&str] {
         static EXTENSIONS: LazyLock<Vec<&'static str>> = LazyLock::new(extensions);
         &EXTENSIONS
+    }
+}
+
+/// Does steps, with pauses, until a file of the folder is wanted, whose name it returns, or all are done.
+pub(super) async fn load_in_steps(loading: &mut Loading) -> Result<Option<String>, CaptureLoadError> {
+    let mut pauses = Pauses::default();
+    loop {
+        if let Some(name) = loading.wanted() {
+            return Ok(Some(name.to_owned()));
+        }
+        if !loading.advance(Loading::STEP)? {
+            return Ok(None);
+        }
+        pauses.after_step().await;
     }
 }
 

@@ -22,9 +22,11 @@
 //! until the new one is on the GPU. If the new capture is invalid or does not fit, the old one stays. A capture and its
 //! GPU memory are freed with its last handle. Without a renderer, captures are ready once they are loaded.
 
+mod chunk_part;
 mod failure;
 mod loader;
 mod messages;
+mod one_file;
 mod parts;
 mod pause;
 mod plugin;
@@ -37,10 +39,13 @@ mod systems;
 mod uploads;
 
 pub use super::component::{CaptureEditError, GaussianCapture, KeyFrames};
+pub(crate) use chunk_part::load_part;
 pub use failure::CaptureFailure;
 pub use loader::{CaptureLoadError, CaptureLoader, CaptureLoaderSettings};
 pub(crate) use messages::send;
 pub use messages::{CaptureFailed, CaptureReady};
+#[cfg(feature = "http_ranges")]
+pub(crate) use one_file::PartSources;
 pub(crate) use parts::{set_up, set_up_late};
 pub use plugin::CaptureAssetPlugin;
 pub use processor::{

@@ -5,6 +5,7 @@
 
 use super::loader::CaptureLoader;
 use super::messages::{CaptureFailed, CaptureReady};
+use super::one_file::PartSources;
 use super::processor;
 #[cfg(feature = "sound")]
 use super::sound_loader::SoundLoader;
@@ -52,11 +53,12 @@ impl Plugin for CaptureAssetPlugin {
 }
 
 fn add(app: &mut App) {
+    let sources = app.world().get_resource::<PartSources>().cloned().unwrap_or_default();
     app.init_asset::<GaussianCapture>()
         .init_asset::<SoundTrack>()
         .init_resource::<Uploads>()
         .register_required_components::<GaussianCapture3d, CaptureState>()
-        .init_asset_loader::<CaptureLoader>()
+        .register_asset_loader(CaptureLoader::of(sources))
         .add_message::<CaptureReady>()
         .add_message::<CaptureFailed>()
         .configure_sets(PreUpdate, CaptureAssetSystems.after(AssetTrackingSystems))

@@ -24,10 +24,16 @@ pub(super) fn fault(
         }
         Obstacle::Failing { file } => file,
     };
-    let name = ChunkTable::file_name(file, schedule.table().files.len());
+    let table = schedule.table();
+    let (name, remedy) = match table.first_byte {
+        None => {
+            let remedy = "check that the folder of the index has all files that were made with it";
+            (format!("file {}", ChunkTable::file_name(file, table.files.len())), remedy)
+        }
+        Some(_) => (format!("chunk file {}", file + 1), "check that the file is whole, and can be reached"),
+    };
     let reason = format!(
-        "its file {name} could not be loaded {} times in a row, for the reasons in the log, and is tried again: \
-         check that the folder of the index has all files that were made with it",
+        "its {name} could not be loaded {} times in a row, for the reasons in the log, and is tried again: {remedy}",
         Obstacle::MANY
     );
     Some(CaptureFailure::Unreadable { path: path(), reason })
@@ -50,7 +56,10 @@ mod tests {
     fn schedule() -> StreamSchedule {
         let file = |stretch, layer, gaussians| ChunkFile { stretches: [stretch; 2], layer, gaussians, bytes: 1 };
         let files = vec![file(0, 0, 10), file(1, 0, 30), file(1, 1, 99)];
-        StreamSchedule::new(ChunkTable { stretches: 2, gaussian_bytes: 100, files, utilities: Vec::new() }.into(), 2.0)
+        StreamSchedule::new(
+            ChunkTable { stretches: 2, gaussian_bytes: 100, files, utilities: Vec::new(), first_byte: None }.into(),
+            2.0,
+        )
     }
 
     #[test]

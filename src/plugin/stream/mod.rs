@@ -1,7 +1,7 @@
 //! Captures of minutes, streamed: only what is played next is in memory.
 //!
-//! In: a capture whose file is the index of a folder of chunk files, as `gs4d split` writes it, from any Bevy asset
-//! source; the [`Playback`](crate::playback::Playback) of its entities; a [`StreamBudget`]. Out: the Gaussians of the
+//! In: a capture whose file is the index of chunk files beside it or after it in one file, as `gs4d split` writes it, from
+//! any Bevy asset source; the [`Playback`](crate::playback::Playback) of its entities; a [`StreamBudget`]. Out: the Gaussians of the
 //! time that is played, drawn; [`CaptureStreamState`], and messages.
 //!
 //! ```text
@@ -24,6 +24,8 @@
 
 mod faults;
 mod heads;
+#[cfg(feature = "http_ranges")]
+mod http_ranges;
 mod messages;
 mod pictures;
 mod plugin;
@@ -32,6 +34,8 @@ mod shares;
 mod state;
 mod streams;
 
+#[cfg(feature = "http_ranges")]
+pub use http_ranges::HttpRangesPlugin;
 pub use messages::{CaptureBuffered, CaptureBuffering, CaptureStalled};
 pub use plugin::{CaptureStreamPlugin, CaptureStreamSystems};
 pub use settings::{CaptureStreamSettings, OnUnderrun, StreamBudget};

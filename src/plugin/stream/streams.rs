@@ -10,7 +10,7 @@ use super::settings::{CaptureStreamSettings, StreamBudget};
 use super::shares::{OnTheWay, Sight, ask_in_turns, shares};
 use super::state::CaptureStreamState;
 use crate::codec::stream::{FileState, Playhead, StreamLimits, StreamSchedule, Throughput, Turn};
-use crate::plugin::asset::{CaptureFailure, CaptureLoaderSettings, Uploads};
+use crate::plugin::asset::{CaptureFailure, CaptureLoaderSettings, Uploads, load_part};
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use crate::plugin::playback::{Cue, NextClip, Playback};
 use crate::plugin::render::logged::error_once_each;
@@ -24,6 +24,7 @@ use bevy::ecs::system::{Query, Res, ResMut};
 use bevy::log::debug_span;
 use bevy::platform::time::Instant;
 use bevy::render::renderer::RenderDevice;
+use bevy::tasks::IoTaskPool;
 use bevy::transform::components::GlobalTransform;
 use glam::Vec3;
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -90,7 +91,7 @@ impl Streams {
 /// The stream of a capture.
 pub(super) struct Stream {
     pub(super) schedule: StreamSchedule,
-    /// The index, in whose folder the files are; `None` for an index that was not loaded from a file.
+    /// The index, in whose folder or file the chunk files are; `None` for an index that was not loaded from a file.
     index: Option<AssetPath<'static>>,
     /// The codebooks of colors, which the index has for all files.
     codebooks: Option<Arc<ColorCodebooks>>,
@@ -155,10 +156,11 @@ impl Stream {
             // Its Gaussians are in memory until the end of the frame in which it is loaded.
             let count = loaded.map_or(0, |capture| capture.scene().len() as u64);
             if count > most {
-                let path = server.get_path(id).map(|path| path.to_string()).unwrap_or_default();
+                let index = server.get_path(own).map(|path| path.to_string()).unwrap_or_default();
                 error_once_each(&format!(
-                    "{path}: {count} Gaussians, and the index says {most}, by which memory is counted, so that the \
-                     file is not drawn: copy the index and all files of the capture again"
+                    "{index}: its chunk file {}: {count} Gaussians, and the index says {most}, by which memory is counted, so that the \
+                     file is not drawn: copy the index and all files of the capture again",
+                    file + 1
                 ));
             }
             let is_refused = count > most || loaded.is_some() && uploads.has_failed(id);
@@ -195,20 +197,31 @@ impl Stream {
             self.files.remove(&file).into_iter().for_each(|handle| uploads.leave(handle.id()));
         }
         for file in plan.fetch {
-            let Some(path) = self.path(file) else {
+            let Some(index) = &self.index else {
                 self.schedule.failed(file, now);
                 continue;
             };
-            // The asset server stops reading a file whose last handle is dropped, but has one itself until the file is
-            // open: over the web, until all of it is there. A load joins such a read. After a deadline, the file is
-            // therefore read once more beside it.
-            let is_stuck = self.schedule.failures_in_a_row(file) > 0 && server.get_path_id(&path).is_some();
             // A file is drawn, and neither picked nor saved.
             let codebooks = self.codebooks.clone();
             let drawn = move |settings: &mut CaptureLoaderSettings| {
                 settings.asset_usage = RenderAssetUsages::RENDER_WORLD;
                 settings.read.codebooks.clone_from(&codebooks);
             };
+            if let Some(range) = self.schedule.table().range(file) {
+                let mut settings = CaptureLoaderSettings::default();
+                drawn(&mut settings);
+                let part = load_part(server.clone(), index.clone(), file, range, settings);
+                // In browsers requests stay on the thread of the page, and their task is what others may wait for.
+                let handle = server.add_async(IoTaskPool::get().spawn(part));
+                uploads.join(handle.id(), id, file);
+                self.files.insert(file, handle);
+                continue;
+            }
+            let path = path_beside(index, file, self.schedule.table().files.len());
+            // The asset server stops reading a file whose last handle is dropped, but has one itself until the file is
+            // open: over the web, until all of it is there. A load joins such a read. After a deadline, the file is
+            // therefore read once more beside it.
+            let is_stuck = self.schedule.failures_in_a_row(file) > 0 && server.get_path_id(&path).is_some();
             let handle = server.load_builder().with_settings(drawn).load(&path);
             uploads.join(handle.id(), id, file);
             self.files.insert(file, handle);
@@ -217,14 +230,12 @@ impl Stream {
             }
         }
     }
+}
 
-    /// Returns where a file is.
-    fn path(&self, file: usize) -> Option<AssetPath<'static>> {
-        let index = self.index.as_ref()?;
-        let name = ChunkTable::file_name(file, self.schedule.table().files.len());
-        let path = index.path().with_file_name(name);
-        Some(AssetPath::from(path).with_source(index.source().clone_owned()))
-    }
+/// Returns where a file is, of `of` files beside an index.
+fn path_beside(index: &AssetPath<'_>, file: usize, of: usize) -> AssetPath<'static> {
+    let path = index.path().with_file_name(ChunkTable::file_name(file, of));
+    AssetPath::from(path).with_source(index.source().clone_owned())
 }
 
 /// What is known of an entity whose capture may be in chunk files.
@@ -371,7 +382,7 @@ mod tests {
         app.register_asset_source("endless", AssetSourceBuilder::new(move || Box::new(source.clone())));
         app.add_plugins((MinimalPlugins, AssetPlugin::default(), CaptureAssetPlugin));
         let files = vec![ChunkFile { stretches: [0, 0], layer: 0, gaussians: 1, bytes: 1 }];
-        let table = ChunkTable { stretches: 1, gaussian_bytes: 88, files, utilities: Vec::new() };
+        let table = ChunkTable { stretches: 1, gaussian_bytes: 88, files, utilities: Vec::new(), first_byte: None };
         let mut stream = Stream::new(table.into(), 1.0, Some("endless://index.gs4d".into()));
         // The first request, its deadline, and the second request.
         for (now, is_requested, count) in [(0.0, true, 1), (31.0, false, 1), (31.5, true, 2)] {

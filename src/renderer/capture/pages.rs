@@ -321,7 +321,7 @@ mod tests {
     fn most_listed_is_a_bound_for_every_segment() {
         let file = |stretches, gaussians| ChunkFile { stretches, layer: 0, gaussians, bytes: 1 };
         let files = vec![file([0, 3], 10), file([0, 0], 20), file([1, 2], 300), file([2, 2], 5), file([3, 3], 400)];
-        let table = ChunkTable { stretches: 4, gaussian_bytes: 1, files, utilities: Vec::new() };
+        let table = ChunkTable { stretches: 4, gaussian_bytes: 1, files, utilities: Vec::new(), first_byte: None };
         assert_eq!(all_pages(&table), 7, "whole pages");
         assert_eq!(most_listed(&table, 4, false), 410, "the last stretch");
         assert_eq!(most_listed(&table, 8, false), 410, "two segments for each stretch");

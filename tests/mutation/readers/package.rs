@@ -1,7 +1,7 @@
 //! Packages.
 //!
 //! In: small scenes in every form. Out: packages with right checksums, lengths and compression, and a wrong header or
-//! wrong sections.
+//! wrong sections; an index that chunk files follow, of which any may be wrong.
 
 use super::{Outcome, Reader};
 use crate::accepted::{self, DrawnBy};
@@ -37,12 +37,14 @@ struct Parts {
     header: Header,
     /// The decompressed bytes of each section; those of a level of detail as stored.
     bodies: Vec<Vec<u8>>,
+    /// The chunk files that follow an index.
+    files: Vec<Self>,
 }
 
 impl Packages {
     /// Makes a seed of every form.
     pub fn new() -> Self {
-        Self { seeds: scenes().iter().map(Parts::of).collect() }
+        Self { seeds: scenes().iter().map(Parts::of).chain([in_one_file()]).collect() }
     }
 }
 
@@ -157,9 +159,22 @@ fn cut() -> GaussianScene {
 fn index() -> GaussianScene {
     let file = |first, last, layer| ChunkFile { stretches: [first, last], layer, gaussians: 300, bytes: 9_000 };
     let files = vec![file(0, 0, 0), file(0, 3, 0), file(0, 3, 1), file(2, 3, 0)];
-    let table = ChunkTable { stretches: 4, gaussian_bytes: 88, files, utilities: Vec::new() };
+    let table = ChunkTable { stretches: 4, gaussian_bytes: 88, files, utilities: Vec::new(), first_byte: None };
     let empty = synthesize(&SynthSettings { count: 0, ..SynthSettings::default() });
     GaussianScene { chunks: Some(Arc::new(table)), ..empty }
+}
+
+/// Returns an index that chunk files follow.
+fn in_one_file() -> Parts {
+    let chunk = |seed| synthesize(&SynthSettings { count: 40, seed, ..SynthSettings::default() });
+    let file = |layer| ChunkFile { stretches: [0, 3], layer, gaussians: 40, bytes: 0 };
+    let mut table = (*index().chunks.expect("an index has a table")).clone();
+    table.files = vec![file(0), file(1)];
+    let mut parts = Parts::of(&GaussianScene { chunks: Some(Arc::new(table)), ..index() });
+    parts.header.chunks_follow = true;
+    parts.header.requires.push("chunks_follow".to_owned());
+    parts.files = [1, 2].map(|seed| Parts::of(&chunk(seed))).into();
+    parts
 }
 
 /// Returns a tetrahedron at rest, one that grows, and nothing afterwards.
@@ -189,11 +204,15 @@ impl Parts {
             });
             rest = after;
         }
-        Self { header, bodies }
+        Self { header, bodies, files: Vec::new() }
     }
 
-    /// Changes one value, section or number.
+    /// Changes one value, section or number, or a chunk file.
     fn change(&mut self, other: &Self, random: &mut Random) {
+        let number = random.below(self.files.len());
+        if let Some(file) = self.files.get_mut(number).filter(|_| random.one_in(2)) {
+            return file.change(other, random);
+        }
         let sections = &mut self.header.sections;
         let at = random.below(sections.len());
         match random.below(20) {
@@ -293,6 +312,7 @@ impl Parts {
     /// Replaces the sections by those that the header requires, with the required sizes, so that a reader reads their
     /// contents.
     fn fit(&mut self) {
+        self.files.iter_mut().for_each(Self::fit);
         let needed = layout(&self.header);
         if needed.iter().any(|&(_, rows, width)| rows.saturating_mul(width).saturating_mul(4) > FITTED) {
             return;
@@ -334,6 +354,15 @@ impl Parts {
             sections.extend((body.len() as u64).to_le_bytes());
             sections.extend(body);
         }
+        let mut files = Vec::new();
+        for (number, file) in std::mem::take(&mut self.files).into_iter().enumerate() {
+            let file = file.seal(other, random);
+            let table = self.header.chunks.as_mut().filter(|_| !random.one_in(100));
+            if let Some(listed) = table.and_then(|table| table.files.get_mut(number)) {
+                listed.bytes = file.len() as u64;
+            }
+            files.extend(file);
+        }
         let mut header = in_words(&self.header);
         if random.one_in(3) {
             header = text::change(&header, &in_words(other), random);
@@ -342,7 +371,7 @@ impl Parts {
         start.extend(VERSION.to_le_bytes());
         start.extend((header.len() as u64).to_le_bytes());
         let checksum = crc32fast::hash(&[&start[..], header.as_bytes()].concat());
-        [&start[..], &checksum.to_le_bytes(), header.as_bytes(), &sections].concat()
+        [&start[..], &checksum.to_le_bytes(), header.as_bytes(), &sections, &files].concat()
     }
 }
 
@@ -363,7 +392,8 @@ fn change_number(header: &mut Header, random: &mut Random) {
     const COEFFICIENTS: [usize; 14] = [0, 1, 2, 4, 5, 9, 10, 15, 16, 17, 32, 33, 48, 49];
     let any = random.one_in(5).then(|| numbers::whole(random));
     let small = |random: &mut Random| any.map_or(random.below(5) as u32, |any| any as u32);
-    match random.below(14) {
+    match random.below(15) {
+        14 => header.chunks_follow ^= true,
         13 => header.codebooks_in_index ^= true,
         12 => change_runs(&mut header.runs, random),
         11 => change_chunks(&mut header.chunks, random),

@@ -438,7 +438,33 @@ impl Player {
         Some(Plan { fetch, give_up })
     }
 
-    /// Returns the name of a file of a capture, which is beside its index.
+    /// Returns the length of the index, bytes, if chunk files follow it in the file that is being received.
+    pub fn index_length(&mut self) -> Option<f64> {
+        match &mut self.opening {
+            Some(Loader::Reading(opening)) => opening.index_length().map(|length| length as f64),
+            _ => None,
+        }
+    }
+
+    /// Ends receiving at the index: the page fetches the files that follow as they are needed.
+    ///
+    /// # Errors
+    /// A message about an index that is damaged, or has not been received.
+    pub fn end_at_index(&mut self) -> Result<(), String> {
+        match &mut self.opening {
+            Some(Loader::Reading(opening)) => opening.end_at_index(),
+            _ => Err("no file is being received".to_owned()),
+        }
+    }
+
+    /// Returns where a file is in the file of its index: its first byte, and the byte after its last. `None`: it is beside
+    /// the index.
+    pub fn file_range(&mut self, stream: u32, file: u32) -> Option<Vec<f64>> {
+        let (_, own) = self.streamed(stream)?;
+        own.file_range(file as usize).map(|range| vec![range.start as f64, range.end as f64])
+    }
+
+    /// Returns the name of a file of a capture, which may be beside its index.
     pub fn file_name(&mut self, stream: u32, file: u32) -> Option<String> {
         self.streamed(stream).map(|(_, own)| own.file_name(file as usize))
     }

@@ -1,15 +1,18 @@
 //! The player of a page as a Bevy app: the model of a game in a browser.
 //!
 //! In: a canvas, then a file, then cameras and times. Out: pictures on the canvas. The page calls [`Player`] from
-//! JavaScript (`page/player.js`), as it calls the player without Bevy; a system of the app applies the calls.
+//! JavaScript (`page/player.js`), as it calls the player without Bevy; a system of the app applies the calls. A capture in
+//! chunk files at an address is streamed by the app itself, as in a game.
 
 use bevy::asset::AssetMetaCheck;
 use bevy::camera::PerspectiveProjection;
+use bevy::camera::primitives::Aabb;
 use bevy::core_pipeline::tonemapping::Tonemapping;
 use bevy::prelude::*;
 use bevy::render::renderer::RenderQueue;
 use bevy_gs4d::prelude::*;
-use bevy_gs4d::scene::RuntimeScene;
+use bevy_gs4d::scene::{Bounds, RuntimeScene};
+use bevy_gs4d::stream::{CaptureStreamState, HttpRangesPlugin};
 use gs4d_web::{About, Opening, OpeningStep, report_panics};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -18,9 +21,14 @@ use web_sys::HtmlCanvasElement;
 /// Frames from a call until its picture has been given to the device.
 const FRAMES: u32 = 2;
 
+/// Seconds after the time that is drawn whose files are loaded ahead: the page has the clock, and the app is at rest.
+const AHEAD: [f32; 4] = [0.5, 1.0, 2.0, 4.0];
+
 /// A player on a canvas.
 #[wasm_bindgen]
 pub struct Player {
+    /// Where the file is that is being opened; `None`: on this device.
+    address: Option<String>,
     opening: Option<Opening>,
     /// What to tell about the capture once it is shown.
     about: Option<About>,
@@ -35,6 +43,9 @@ struct Shared(Arc<Mutex<State>>);
 struct State {
     /// From the page: a scene to show, the camera and the time to draw, and the bias of the level of detail.
     scene: Option<Box<RuntimeScene>>,
+    /// From the page: where a capture in chunk files is. From the app: its place, once its first picture can be drawn.
+    address: Option<String>,
+    place: Option<Bounds>,
     shot: Option<Shot>,
     detail: f32,
     /// The background in place of that of the capture, which is `trained`.
@@ -78,6 +89,7 @@ impl Player {
         };
         App::new()
             .add_plugins((
+                HttpRangesPlugin,
                 DefaultPlugins
                     .set(WindowPlugin { primary_window: Some(window), ..default() })
                     // A server answers a request for a file that is not there with an error in the console.
@@ -89,7 +101,7 @@ impl Player {
             .add_systems(Startup, setup)
             .add_systems(Update, apply_calls)
             .run();
-        Ok(Self { opening: None, about: None, shared })
+        Ok(Self { address: None, opening: None, about: None, shared })
     }
 
     /// Sets the bias of the level of detail: captures count as two to this power as large.
@@ -100,6 +112,26 @@ impl Player {
     /// Sets the background: three numbers from 0 to 1, sRGB-encoded; without them, that of the capture.
     pub fn set_background(&mut self, color: Option<Vec<f32>>) {
         self.shared.state().background = color.and_then(|color| color.try_into().ok());
+    }
+
+    /// Sets where the file is that is opened next: an absolute address; without it, on this device.
+    pub fn set_address(&mut self, address: Option<String>) {
+        self.address = address;
+    }
+
+    /// Returns the length of the index, bytes, if chunk files follow it in the file that is being received, and the app can
+    /// fetch them.
+    pub fn index_length(&mut self) -> Option<f64> {
+        self.address.as_ref()?;
+        self.opening.as_mut()?.index_length().map(|length| length as f64)
+    }
+
+    /// Ends receiving at the index: the app fetches the files that follow.
+    ///
+    /// # Errors
+    /// A message about an index that is damaged, or has not been received.
+    pub fn end_at_index(&mut self) -> Result<(), String> {
+        self.opening.as_mut().ok_or("no file is being received")?.end_at_index()
     }
 
     /// Begins to open a file, whose length is 0 if it is not known. The capture that is shown stays until the file is
@@ -126,15 +158,21 @@ impl Player {
         if let Some(mut opening) = self.opening.take() {
             match opening.advance()? {
                 OpeningStep::Part => self.opening = Some(opening),
-                OpeningStep::Scene(scene) if scene.chunks.is_some() => {
-                    let remedy = "leave engine=bevy out of the link, or join the files by gs4d join";
-                    return Err(format!(
-                        "it is the index of a capture in chunk files, which this player does not fetch: {remedy}"
-                    ));
-                }
                 OpeningStep::Scene(scene) => {
-                    self.about = Some(About::of(&scene));
+                    let mut about = About::of(&scene);
                     let mut state = self.shared.state();
+                    if let Some(table) = &scene.chunks {
+                        let Some(address) = self.address.clone() else {
+                            let remedy = "leave engine=bevy out of the link, or join the files by gs4d join";
+                            return Err(format!(
+                                "it is the index of a capture in chunk files, which this player fetches from addresses \
+                                 alone: {remedy}"
+                            ));
+                        };
+                        about.place(table.files.iter().map(|file| file.gaussians).sum(), None);
+                        (state.address, state.place) = (Some(address), None);
+                    }
+                    self.about = Some(about);
                     (state.scene, state.shown, state.failed) = (Some(scene), false, None);
                 }
             }
@@ -143,7 +181,13 @@ impl Player {
         let mut state = self.shared.state();
         match state.failed.take() {
             Some(message) => Err(message),
-            None if state.shown => self.about.take().map(Some).ok_or_else(|| "no file is being opened".to_owned()),
+            None if state.shown => {
+                let mut about = self.about.take().ok_or("no file is being opened")?;
+                if let place @ Some(_) = state.place.take() {
+                    about.place(about.gaussians.into(), place);
+                }
+                Ok(Some(about))
+            }
             None => Ok(None),
         }
     }
@@ -199,8 +243,10 @@ fn apply_calls(
     queue: Option<Res<RenderQueue>>,
     mut clear: ResMut<ClearColor>,
     mut detail: ResMut<CaptureDetail>,
+    server: Res<AssetServer>,
     mut captures: ResMut<Assets<GaussianCapture>>,
-    mut shown: Query<(Entity, &GaussianCapture3d, &CaptureState, &mut Playback)>,
+    mut shown: Query<(Entity, &GaussianCapture3d, &CaptureState, &mut Playback, Option<&Aabb>)>,
+    mut streamed: Query<&mut CaptureStreamSettings, With<CaptureStreamState>>,
     mut camera: Single<(&mut Transform, &mut Projection), With<Camera3d>>,
 ) {
     let mut state = shared.state();
@@ -215,13 +261,22 @@ fn apply_calls(
             commands.entity(entity).despawn();
         }
         state.trained = scene.trained_with.background;
-        let capture = captures.add(GaussianCapture::new(*scene));
-        commands.spawn((GaussianCapture3d(capture), Playback { playing: false, ..default() }));
+        let capture = match state.address.take() {
+            Some(address) => server.load(address),
+            None => captures.add(GaussianCapture::new(*scene)),
+        };
+        let settings = CaptureStreamSettings::default();
+        commands.spawn((GaussianCapture3d(capture), Playback { playing: false, ..default() }, settings));
         return;
     }
-    let Ok((_, GaussianCapture3d(capture), loaded, mut playback)) = shown.single_mut() else { return };
+    let Ok((_, GaussianCapture3d(capture), loaded, mut playback, place)) = shown.single_mut() else { return };
     match loaded {
-        CaptureState::Ready => state.shown = true,
+        CaptureState::Ready => {
+            if !state.shown && !streamed.is_empty() {
+                state.place = place.map(|place| Bounds { min: place.min().into(), max: place.max().into() });
+            }
+            state.shown = true;
+        }
         CaptureState::Failed(failure) if !state.shown => state.failed = Some(failure.to_string()),
         _ => {}
     }
@@ -237,6 +292,11 @@ fn apply_calls(
     }
     if let (Some(shot), Some(capture)) = (state.shot.take(), captures.get(capture)) {
         playback.time = capture.seconds_at(shot.time);
+        for mut settings in &mut streamed {
+            let (now, duration) = (playback.time, capture.duration_seconds());
+            settings.preload =
+                AHEAD.iter().map(|ahead| (now + ahead).rem_euclid(duration.max(f32::MIN_POSITIVE))).collect();
+        }
         let (transform, projection) = &mut *camera;
         **transform = shot.camera;
         **projection = Projection::Perspective(PerspectiveProjection { fov: shot.fov, ..default() });

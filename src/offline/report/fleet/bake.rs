@@ -147,8 +147,8 @@ fn inspect(path: &Path) -> Result<PackageInfo, String> {
         _ => format!("it cannot be opened: {error}"),
     })?;
     let info = package::inspect(file).map_err(|error| error.to_string())?;
-    match (info.damaged.len(), info.header.sections.len()) {
-        (0, _) => Ok(info),
-        (damaged, all) => Err(format!("{damaged} of its {all} sections are damaged: copy or bake it again")),
+    match info.damage() {
+        None => Ok(info),
+        Some(damage) => Err(format!("{damage}: copy or bake it again")),
     }
 }

@@ -12,6 +12,7 @@ use bevy_gs4d::gaussian::Gaussian;
 use bevy_gs4d::renderer::{ActiveList, ChunkFiles, FileUpload, GpuCapture, Renderer, ViewRenderer};
 use bevy_gs4d::scene::{Bounds, ChunkTable, Importances, RuntimeScene};
 use std::collections::{BTreeMap, VecDeque};
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Bytes on the GPU of the Gaussians of a capture in chunk files.
@@ -123,7 +124,12 @@ impl Streamed {
         Importances::of_all(self.files.values().map(|(count, importances)| (*count, importances)))
     }
 
-    /// Returns the name of a file, which is beside the index.
+    /// Returns where a file is in the file of the index, bytes; `None` if it is beside the index.
+    pub fn file_range(&self, file: usize) -> Option<Range<u64>> {
+        self.table().range(file)
+    }
+
+    /// Returns the name of a file, which may be beside the index.
     pub fn file_name(&self, file: usize) -> String {
         ChunkTable::file_name(file, self.table().files.len())
     }
@@ -290,12 +296,18 @@ impl Streamed {
                 needed >> 20,
                 GPU_BYTES >> 20
             ),
-            Obstacle::Failing { file } => format!(
-                "its file {} could not be loaded {} times in a row: the folder of the index needs all files that were \
-                 made with it",
-                self.file_name(file),
-                Obstacle::MANY
-            ),
+            Obstacle::Failing { file } => {
+                let (name, remedy) = match self.file_range(file) {
+                    None => {
+                        let remedy = "the folder of the index needs all files that were made with it";
+                        (format!("file {}", self.file_name(file)), remedy)
+                    }
+                    Some(_) => {
+                        (format!("chunk file {}", file + 1), "the file has to be whole, and its server to send it")
+                    }
+                };
+                format!("its {name} could not be loaded {} times in a row: {remedy}", Obstacle::MANY)
+            }
         })
     }
 }
