@@ -201,7 +201,7 @@
 //! | `openxr` | the example `walkthrough` for a headset, untried | `viewer` |
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![cfg_attr(
-    not(all(feature = "cli", feature = "inspector", feature = "testing")),
+    not(all(feature = "cli", feature = "http_ranges", feature = "inspector", feature = "testing")),
     expect(rustdoc::broken_intra_doc_links, reason = "this page describes modules that are not part of this build")
 )]
 #![cfg_attr(

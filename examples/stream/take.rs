@@ -1,7 +1,8 @@
 //! A capture in chunk files, on the disk.
 //!
-//! In: the path of its index, or of the file of the index and all chunk files. Out: a [`Take`], which says how large the files
-//! are, and one of its files, around which the camera orbits. Both are read past the link, before anything is measured.
+//! In: the path of its index, or of the file of the index and all chunk files. Out: a [`Take`], which says how large
+//! the files are, and one of its files, around which the camera orbits. Both are read past the link, before anything is
+//! measured.
 
 use crate::common::asset_path;
 use crate::figures::mebibytes;
@@ -86,11 +87,11 @@ impl fmt::Display for Take {
 
 /// Reads an index, without the chunk files that may follow it.
 fn read_index(file: &Path) -> Result<RuntimeScene> {
-    let (mut bytes, mut length) = (Vec::new(), 1 << 16);
-    while Following::of(&bytes) == Following::Undecided && bytes.len() as u64 != length {
+    let mut length = 1 << 16;
+    let mut bytes = bytes_of(file, 0..length)?;
+    while Following::of(&bytes) == Following::Undecided && bytes.len() as u64 == length {
         length *= 2;
         bytes = bytes_of(file, 0..length)?;
-        length = length.min(bytes.len() as u64);
     }
     let options = ReadOptions::default();
     finished(match Following::of(&bytes) {

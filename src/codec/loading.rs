@@ -22,8 +22,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 /// A file that is being read.
 ///
 /// A capture may consist of several files: the textures of a SOG, `cfg_args` of a checkpoint, the frames of a sequence
-/// ([`ReadOptions::sequence`]), the index of a chunk file. [`wanted`](Self::wanted) names the next of them, and [`supply`](Self::supply) takes it.
-/// A program that supplies none reads captures of a single file.
+/// ([`ReadOptions::sequence`]), the index of a chunk file. [`wanted`](Self::wanted) names the next of them, and
+/// [`supply`](Self::supply) takes it. A program that supplies none reads captures of a single file.
 ///
 /// # Examples
 ///
@@ -86,8 +86,8 @@ impl Loading {
     }
 
     /// As [`new`](Self::new), of an index that chunk files follow in one file
-    /// ([`Following::From`](package::Following::From)). `bytes` are those before the first of these. The scene is the index,
-    /// whose table says where the files are ([`ChunkTable::range`]).
+    /// ([`Following::From`](package::Following::From)). `bytes` are those before the first of these. The scene is the
+    /// index, whose table says where the files are ([`ChunkTable::range`]).
     ///
     /// # Errors
     /// As [`new`](Self::new).

@@ -1,8 +1,8 @@
 //! The chunk files of a capture: which Gaussians are in which file.
 //!
-//! In: the files that `gs4d split` wrote. Out: a [`ChunkTable`], part of the index of the capture, which has no Gaussians
-//! itself: from the table a player knows which files it needs at a time, and how many bytes they are, before it asks for
-//! one.
+//! In: the files that `gs4d split` wrote. Out: a [`ChunkTable`], part of the index of the capture, which has no
+//! Gaussians itself: from the table a player knows which files it needs at a time, and how many bytes they are, before
+//! it asks for one.
 
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -17,12 +17,12 @@ pub struct ChunkTable {
     pub gaussian_bytes: u32,
     /// The files.
     pub files: Vec<ChunkFile>,
-    /// What each layer adds to the PSNR of held-out views for each byte of its files, dB per megabyte; empty if that was
-    /// not measured.
+    /// What each layer adds to the PSNR of held-out views for each byte of its files, dB per megabyte; empty if that
+    /// was not measured.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub utilities: Vec<f32>,
-    /// Where the first file is in the file of the index, bytes from its start, if the files follow the index in one file,
-    /// one after the other. `None`: each is a file beside the index.
+    /// Where the first file is in the file of the index, bytes from its start, if the files follow the index in one
+    /// file, one after the other. `None`: each is a file beside the index.
     #[serde(skip)]
     pub first_byte: Option<u64>,
 }
@@ -78,8 +78,8 @@ impl ChunkTable {
         format!("chunk-{:05}-of-{of:05}.gs4d", number + 1)
     }
 
-    /// Returns where a file is in the file of the index, bytes from its start. `number` counts from 0. `None`: the files
-    /// are beside the index, or there is no such file.
+    /// Returns where a file is in the file of the index, bytes from its start. `number` counts from 0. `None`: the
+    /// files are beside the index, or there is no such file.
     pub fn range(&self, number: usize) -> Option<Range<u64>> {
         let (own, before) = (self.files.get(number)?, self.files.get(..number)?);
         let start = before.iter().fold(self.first_byte?, |end, file| end.saturating_add(file.bytes));
@@ -104,10 +104,10 @@ impl ChunkTable {
     }
 
     /// Returns how much later the files of each layer may come than those of layer 0, in multiples of
-    /// [`StreamLimits::layer_seconds`](crate::codec::stream::StreamLimits::layer_seconds): 1 for a layer of a quarter of the
-    /// utility of layer 0, so that a byte counts a quarter as much once it is that late, 2 for a sixteenth and so on, at most
-    /// [`LATEST`](Self::LATEST), which layers have that make pictures worse. Where utilities were not measured, each layer
-    /// counts as a quarter of the one before.
+    /// [`StreamLimits::layer_seconds`](crate::codec::stream::StreamLimits::layer_seconds): 1 for a layer of a quarter
+    /// of the utility of layer 0, so that a byte counts a quarter as much once it is that late, 2 for a sixteenth and
+    /// so on, at most [`LATEST`](Self::LATEST), which layers have that make pictures worse. Where utilities were not
+    /// measured, each layer counts as a quarter of the one before.
     pub fn delays(&self) -> [f64; Self::MOST_LAYERS as usize] {
         let first = self.utilities.first().copied().map_or(0.0, |own| f64::from(own).max(0.0));
         std::array::from_fn(|layer| match self.utilities.get(layer) {
@@ -141,8 +141,8 @@ impl ChunkTable {
         ((share * f64::from(self.stretches)).max(0.0) as u32).min(self.stretches.saturating_sub(1))
     }
 
-    /// Returns the first and the last of `stretches` stretches of time that segments have: from the first to the last of
-    /// them, of `of` segments of the same time. Both are of equal length.
+    /// Returns the first and the last of `stretches` stretches of time that segments have: from the first to the last
+    /// of them, of `of` segments of the same time. Both are of equal length.
     pub fn stretches_of([first, last]: [u32; 2], of: u32, stretches: u32) -> [u32; 2] {
         let (segments, stretches) = (u64::from(of.max(1)), u64::from(stretches.max(1)));
         let last = ((u64::from(last) + 1) * stretches).div_ceil(segments).clamp(1, stretches) - 1;

@@ -1,7 +1,7 @@
 //! The capture of chunks.
 //!
-//! In: the chunks of a capture, in order. Out: the capture, with the Gaussians in the order of the chunks; a packed one is
-//! the package that was cut.
+//! In: the chunks of a capture, in order. Out: the capture, with the Gaussians in the order of the chunks; a packed one
+//! is the package that was cut.
 
 use super::packed::{BLOCK, SHARED_RANGES};
 use super::{ActiveSets, Form, GaussianScene, PackedColors, PackedScene, RunPart, Runs, SceneForm, TemporalFilter};

@@ -1,8 +1,8 @@
 //! Captures in one file of an index and its chunk files, of which Bevy reads parts.
 //!
-//! In: a file that `gs4d split` has written, on a disk and on servers that send parts, fail now and then, or send none. Out:
-//! proof that the parts that are played are read, and no others; that failures are made good; that without parts all of the
-//! file is played. `stream.rs` has the pictures.
+//! In: a file that `gs4d split` has written, on a disk and on servers that send parts, fail now and then, or send none.
+//! Out: proof that the parts that are played are read, and no others; that failures are made good; that without parts
+//! all of the file is played. `stream.rs` has the pictures.
 
 use crate::support::range_server::{Answers, RangeServer};
 use crate::support::split::SPLIT;

@@ -1,6 +1,7 @@
 //! A server of one file, with faults.
 //!
-//! In: the bytes of a file, whether parts of it are sent, and which requests fail. Out: an address; what has been asked for.
+//! In: the bytes of a file, whether parts of it are sent, and which requests fail. Out: an address; what has been asked
+//! for.
 
 use std::io::{BufRead, BufReader, Write};
 use std::net::{TcpListener, TcpStream};

@@ -1,6 +1,7 @@
 //! Synthetic captures that `gs4d split` has cut.
 //!
-//! Out: the index and the chunk files of a capture, all of them in one file, and the capture that `gs4d join` makes of them.
+//! Out: the index and the chunk files of a capture, all of them in one file, and the capture that `gs4d join` makes of
+//! them.
 
 use bevy_gs4d::codec::{self, ReadOptions};
 use bevy_gs4d::scene::ChunkTable;

@@ -424,6 +424,8 @@ async function bevy(shots) {
     results[`the app streams ${address}`] = player.page.about.gaussians === 4000 && player.had('error').length === 0;
     await until('the picture', () => player.page.player.is_ready());
   }
+  const parts = player.inside.performance.getEntriesByType('resource').filter((one) => one.name.endsWith('/parts.gs4d'));
+  results['the app fetches parts of one file'] = parts.length > 4;
   await post('app-streams', results);
   // Bevy writes its adapter to the log.
   await player.close('bevy');

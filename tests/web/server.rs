@@ -154,7 +154,8 @@ fn answer(
             "content-length" => length = value.trim().parse().ok()?,
             "range" => {
                 let (first, last) = value.trim().strip_prefix("bytes=")?.split_once('-')?;
-                range = Some((first.parse::<usize>().ok()?, last.parse::<usize>().ok()?));
+                let last = if last.is_empty() { usize::MAX - 1 } else { last.parse().ok()? };
+                range = Some((first.parse::<usize>().ok()?, last));
             }
             _ => {}
         }
@@ -189,7 +190,11 @@ fn answer(
     };
     if let Some((first, last)) = range.filter(|_| path == "/parts.gs4d") {
         let end = bytes.len().min(last + 1);
-        return write(reader.get_mut(), "206 Partial Content", kind, bytes.get(first..end)?);
+        let Some(part) = bytes.get(first..end).filter(|part| !part.is_empty()) else {
+            return write(reader.get_mut(), "416 Range Not Satisfiable", "text/plain", b"");
+        };
+        let status = format!("206 Partial Content\r\nContent-Range: bytes {first}-{}/{}", end - 1, bytes.len());
+        return write(reader.get_mut(), &status, kind, part);
     }
     write(reader.get_mut(), "200 OK", kind, &bytes)
 }

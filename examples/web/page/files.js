@@ -54,6 +54,7 @@ export async function request(address, signal) {
   let url;
   try {
     url = new URL(address, location.href);
+    url.hash = '';
   } catch {
     throw new Refusal(`"${address}" is no address`);
   }
@@ -166,14 +167,18 @@ export class Opener {
       this.slice(() => this.player.receive(value));
       received += value.length;
       const index = this.player.index_length?.();
-      if (index !== undefined) within ??= parts(signal).catch(() => null);
-      if (received >= index && (await within)) {
+      if (index !== undefined) within ??= parts(signal).catch((error) => error);
+      if (received >= index) {
+        const found = await within;
         if (signal.aborted) return;
-        reader.cancel().catch(() => {});
-        this.slice(() => this.player.end_at_index());
-        return within;
+        if (found instanceof Error) throw new Refusal(`${name} was not opened: no part of it was loaded: ${found.message}.`, true);
+        if (found) {
+          reader.cancel().catch(() => {});
+          this.slice(() => this.player.end_at_index());
+          return found;
+        }
+        this.lacksParts = address?.host ?? '';
       }
-      if (received >= index) this.lacksParts = address?.host ?? '';
       this.report({ name, part: length ? 0.7 * Math.min(1, received / length) : 0.35, bytes: received, total: length, state: 'receiving' });
       // A file of unknown length may take as long again.
       const left = length ? waited * (length / received - 1) : waited;

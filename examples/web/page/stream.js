@@ -28,7 +28,11 @@ export function among(files) {
 async function part(url, from, to, signal) {
   // A browser's cache would let one request for an address wait for another.
   const response = await fetch(url, { headers: { Range: `bytes=${from}-${to - 1}` }, cache: 'no-store', signal });
-  if (response.status === 206) return response.arrayBuffer();
+  if (response.status === 206) {
+    const bytes = await response.arrayBuffer();
+    if (bytes.byteLength !== to - from) throw new Error(`the server sent ${bytes.byteLength} of ${to - from} bytes`);
+    return bytes;
+  }
   response.body?.cancel().catch(() => {});
   if (!response.ok) throw new Error(`the server answered ${response.status}`);
   return null;

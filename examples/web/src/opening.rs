@@ -1,8 +1,9 @@
 //! A file that is opened in steps short enough for a page.
 //!
-//! In: the name of a file and, if it is known, its length; then its bytes, piece by piece. Out: while bytes are missing,
-//! openings of the layers of a package that have been received; after some steps, a scene ready to draw; an error
-//! message for a file that cannot be read. Of an index that chunk files follow, the page may receive no more than the index.
+//! In: the name of a file and, if it is known, its length; then its bytes, piece by piece. Out: while bytes are
+//! missing, openings of the layers of a package that have been received; after some steps, a scene ready to draw; an
+//! error message for a file that cannot be read. Of an index that chunk files follow, the page may receive no more than
+//! the index.
 
 use bevy_gs4d::codec::package::{Beginning, Following};
 use bevy_gs4d::codec::{CodecError, Loading, ReadOptions};

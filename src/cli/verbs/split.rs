@@ -130,10 +130,9 @@ impl SplitVerb {
     /// Returns the PSNR of the validation views without a layer, with the first, with the first two and so on, dB; none if
     /// there are no views.
     fn measured(&self, segment: &Segment, split: &Split) -> Result<Vec<f64>, Failure> {
-        if self.data.is_given() { self.measure(segment, split) } else { Ok(Vec::new()) }
-    }
-
-    fn measure(&self, segment: &Segment, split: &Split) -> Result<Vec<f64>, Failure> {
+        if !self.data.is_given() {
+            return Ok(Vec::new());
+        }
         let progress = &mut Bars::default();
         let scene = &segment.scene;
         let views = self.data.divide(self.validation, &scene.trained_with, progress)?.validation;

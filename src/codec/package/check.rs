@@ -12,7 +12,9 @@ use crate::gaussian::SMALLEST_CUTOFF;
 use crate::gaussian::harmonics::{MAX_COEFFICIENTS, evaluated};
 use crate::scene::detail::check_sizes;
 use crate::scene::packed::{MAX_ENTRIES, are_layers};
-use crate::scene::{ChunkTable, GaussianScene, MAX_LEVELS, MAX_SEGMENTS, SceneForm, SoundFile, Trained, check_sockets};
+use crate::scene::{
+    ChunkFile, ChunkTable, GaussianScene, MAX_LEVELS, MAX_SEGMENTS, SceneForm, SoundFile, Trained, check_sockets,
+};
 
 /// Uncompressed bytes that a package of any length may hold.
 const RAW_FLOOR: u64 = 64 << 20;
@@ -32,8 +34,9 @@ impl Header {
         scene.check().map_err(PackageError::Inconsistent)
     }
 
-    /// Checks that the sections, from `start` on, with the chunk files that follow fill a file of `file_length` bytes and
-    /// hold every attribute once, and that all numbers are valid. Afterwards the sizes of [`attributes`](Self::attributes) can be allocated.
+    /// Checks that the sections, from `start` on, with the chunk files that follow fill a file of `file_length` bytes
+    /// and hold every attribute once, and that all numbers are valid. Afterwards the sizes of
+    /// [`attributes`](Self::attributes) can be allocated.
     pub(super) fn check(&self, start: u64, file_length: u64) -> Result<(), PackageError> {
         let expected = self.length(start);
         if expected > file_length {
@@ -48,7 +51,8 @@ impl Header {
         }
         self.check_numbers()?;
         let attributes = self.attributes();
-        let limit = unpacked_limit(file_length);
+        // Chunk files are read by themselves.
+        let limit = unpacked_limit(self.end(start));
         let within = |raw: u64| if raw > limit { Err(PackageError::TooLarge { raw, limit }) } else { Ok(()) };
         within(self.scene_memory(&attributes))?;
         attributes.iter().try_for_each(|attribute| check_sections(attribute, &self.sections))?;
@@ -69,6 +73,17 @@ impl Header {
     fn scene_memory(&self, attributes: &[Attribute]) -> u64 {
         let colliders = self.colliders.as_ref().map(StoredColliders::memory).unwrap_or_default();
         attributes.iter().fold(colliders, |sum, attribute| sum.saturating_add(attribute.memory()))
+    }
+
+    /// Checks that it is the header of a chunk file as the table of its index says.
+    pub(super) fn check_chunk(&self, file: &ChunkFile) -> Result<(), PackageError> {
+        if !self.levels.is_empty() || self.chunks.is_some() {
+            return Err(PackageError::Inconsistent("a chunk file that has levels of detail, or chunk files itself"));
+        }
+        if self.gaussians as u64 != file.gaussians {
+            return Err(PackageError::Inconsistent("a chunk file of another number of Gaussians than in the table"));
+        }
+        Ok(())
     }
 
     /// Checks that each level of detail has its section, in order.
@@ -164,6 +179,7 @@ impl Header {
             !self.chunks_follow || self.chunks.is_some(),
             "chunk files that follow a package without a table of them",
         )?;
+        sane(!self.chunks_follow || self.sound.is_none(), "a sound in the index of chunk files that follow it")?;
         let duration = self.playback.duration_seconds;
         sane(duration.is_finite() && duration >= 0.0, "the playback duration must be a finite number, zero or above")
     }

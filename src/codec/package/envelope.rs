@@ -44,14 +44,14 @@ pub(super) fn read(reader: &mut (impl Read + Seek)) -> Result<(Header, u64), Pac
     Ok((header, file_length))
 }
 
-/// Reads and checks the fixed start and the header of an index that chunk files follow, of which all bytes up to the first
-/// of these can be read. Also returns the length of the whole file.
+/// Reads and checks the fixed start and the header of an index that chunk files follow, of which all bytes up to the
+/// first of these can be read. Also returns its length: the chunk files are only claimed.
 pub(super) fn read_index(reader: &mut impl Read, bytes: u64) -> Result<(Header, u64), PackageError> {
     let (header, start) = read_header(reader, bytes)?;
-    check_file_length(header.end(start), bytes)?;
-    let file_length = header.length(start);
-    header.check(start, file_length)?;
-    Ok((header, file_length))
+    let end = header.end(start);
+    check_file_length(end, bytes)?;
+    header.check(start, header.length(start))?;
+    Ok((header, end))
 }
 
 /// Reads and checks the fixed start and the header of a package whose beginning has been received. Also returns where

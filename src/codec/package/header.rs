@@ -66,8 +66,8 @@ pub struct Header {
     /// Number of bytes of the sound file, if there is one. Levels of detail have none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sound: Option<usize>,
-    /// The chunk files that have the Gaussians, if the package is the index of a capture in chunk files. Levels of detail
-    /// have none.
+    /// The chunk files that have the Gaussians, if the package is the index of a capture in chunk files. Levels of
+    /// detail have none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chunks: Option<ChunkTable>,
     /// Whether the chunk files follow the last section in their order, each a package.
@@ -266,7 +266,8 @@ impl Header {
         self.sections.iter().fold(start, |end, s| end.saturating_add(8).saturating_add(s.length as u64))
     }
 
-    /// Returns the length of the file in bytes, if the first section starts at `start`: with the chunk files that follow.
+    /// Returns the length of the file in bytes, if the first section starts at `start`: with the chunk files that
+    /// follow.
     pub(super) fn length(&self, start: u64) -> u64 {
         self.files_that_follow().iter().fold(self.end(start), |end, file| end.saturating_add(file.bytes))
     }

@@ -1,7 +1,7 @@
 //! The limit of the memory of a package with the packages within it, which follows from the length of the file.
 //!
-//! In: the header of a package, then the bytes of each level of detail and each chunk file. Out: the header of the level or
-//! the chunk file; an error above the limit.
+//! In: the header of a package, then the bytes of each level of detail and each chunk file. Out: the header of the
+//! level or the chunk file; an error above the limit.
 
 use super::check::unpacked_limit;
 use super::envelope;
@@ -35,12 +35,7 @@ impl MemoryLimit {
     /// Returns the header of a chunk file, which must be within the limit and have what the table says, and its end.
     pub(super) fn header_of_chunk(&mut self, body: &[u8], file: &ChunkFile) -> Result<(Header, u64), PackageError> {
         let (header, start) = read(body)?;
-        if !header.levels.is_empty() || header.chunks.is_some() {
-            return Err(PackageError::Inconsistent("a chunk file that has levels of detail, or chunk files itself"));
-        }
-        if header.gaussians as u64 != file.gaussians {
-            return Err(PackageError::Inconsistent("a chunk file of another number of Gaussians than in the table"));
-        }
+        header.check_chunk(file)?;
         self.add(&header)?;
         Ok((header, start))
     }

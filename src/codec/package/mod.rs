@@ -140,6 +140,9 @@ fn write_with<W: Write>(
     settings: &WriteSettings,
     role: Role,
 ) -> Result<(), PackageError> {
+    if role != Role::Index && scene.chunks.as_ref().is_some_and(|table| table.first_byte.is_some()) {
+        return Err(PackageError::Inconsistent("the index of chunk files in one file, which are not written with it"));
+    }
     let mut header = Header::of(scene, role);
     let colliders = scene.colliders.as_deref().map(ColliderWords::of).unwrap_or_default();
     header.check_writable(scene, &colliders)?;
@@ -283,7 +286,7 @@ pub fn inspect<R: Read + Seek>(reader: R) -> Result<PackageInfo, PackageError> {
         body.clear();
         Read::by_ref(&mut reader).take(file.bytes).read_to_end(&mut body)?;
         let is_intact = inspect_sections(&mut Cursor::new(&body))
-            .is_ok_and(|(header, _, damaged)| header.chunks.is_none() && damaged.is_empty());
+            .is_ok_and(|(header, _, damaged)| header.check_chunk(file).is_ok() && damaged.is_empty());
         if !is_intact {
             damaged_files.push(number);
         }

@@ -1,8 +1,8 @@
 //! Reading a package in steps, so that a program can do other work between them.
 //!
 //! In: a reader that contains a package and nothing else. Out: after any number of steps, its scene. A step allocates a
-//! piece of the scene, reads a piece of a section, decompresses one, or writes one into the scene. Of an index that chunk
-//! files follow, the scene is the capture of these, or the index alone.
+//! piece of the scene, reads a piece of a section, decompresses one, or writes one into the scene. Of an index that
+//! chunk files follow, the scene is the capture of these, or the index alone.
 
 use super::attribute::Attribute;
 use super::colliders::ColliderWords;
@@ -32,6 +32,8 @@ pub(crate) struct Reading<R> {
     is_index: bool,
     files: usize,
     union: Option<Union>,
+    /// Whether the temporal filter of the first chunk file is stored as bits, if it has one.
+    bits: Option<Option<bool>>,
 }
 
 /// The sections of a package, without levels of detail, of which some have been read.
@@ -82,21 +84,21 @@ impl<R: Read + Seek> Reading<R> {
         Ok(Self::of(reader, header, file_length, false))
     }
 
-    /// Reads the header of an index that chunk files follow, of which the reader has `bytes` bytes: all up to the first of
-    /// these. The scene is the index alone.
+    /// Reads the header of an index that chunk files follow, of which the reader has `bytes` bytes: all up to the first
+    /// of these. The scene is the index alone.
     ///
     /// # Errors
     /// A damaged header.
     pub(crate) fn of_index(reader: R, bytes: u64) -> Result<Self, PackageError> {
         let mut reader = BufReader::new(reader);
-        let (header, file_length) = envelope::read_index(&mut reader, bytes)?;
-        Ok(Self::of(reader, header, file_length, true))
+        let (header, length) = envelope::read_index(&mut reader, bytes)?;
+        Ok(Self::of(reader, header, length, true))
     }
 
     fn of(reader: BufReader<R>, header: Header, file_length: u64, is_index: bool) -> Self {
         let limit = MemoryLimit::of(&header, file_length);
-        let (part, levels, files, union) = Default::default();
-        Self { reader, limit, sections: Sections::new(header), part, levels, is_index, files, union }
+        let (part, levels, files, union, bits) = Default::default();
+        Self { reader, limit, sections: Sections::new(header), part, levels, is_index, files, union, bits }
     }
 
     /// Does one step, which decompresses or writes about `bytes` at most. Returns whether there is more to do.
@@ -151,9 +153,15 @@ impl<R: Read + Seek> Reading<R> {
     /// Appends a chunk file of which all sections have been read.
     fn unite(&mut self, sections: Sections) -> Result<(), PackageError> {
         let needs_codebooks = sections.header.codebooks_in_index;
+        // Sets in two forms become bits, of which a small file may need any number.
+        let bits = sections.header.filter.map(|filter| filter.bits);
+        if *self.bits.get_or_insert(bits) != bits {
+            return Err(PackageError::Inconsistent("it has a temporal filter in another form than the first"));
+        }
         let mut scene = sections.into_scene();
         if needs_codebooks {
-            supply(&mut scene, self.sections.scene.form.codebooks())?;
+            let codebooks = self.sections.scene.form.codebooks();
+            supply(&mut scene, Some(codebooks.ok_or(PackageError::Inconsistent("its index has no codebooks"))?))?;
         }
         scene.check().map_err(PackageError::Inconsistent)?;
         self.files += 1;
@@ -190,8 +198,8 @@ impl<R: Read + Seek> Reading<R> {
         self.sections.header.codebooks_in_index
     }
 
-    /// Does all remaining steps, and returns the scene, whose parts fit together. `codebooks` are those of the index, if
-    /// the package [needs](Self::needs_codebooks) them.
+    /// Does all remaining steps, and returns the scene, whose parts fit together. `codebooks` are those of the index,
+    /// if the package [needs](Self::needs_codebooks) them.
     ///
     /// # Errors
     /// A damaged section; parts that contradict each other; codebooks that are missing, or are others.

@@ -1,6 +1,7 @@
 //! A chunk file in the file of its index.
 //!
-//! In: the file of an index in an asset source, where the chunk file is in it. Out: its capture; an error that names both.
+//! In: the file of an index in an asset source, where the chunk file is in it. Out: its capture; an error that names
+//! both.
 
 use super::loader::{CaptureLoadError, CaptureLoaderSettings, load_in_steps};
 use super::one_file::{PIECE, read_more};

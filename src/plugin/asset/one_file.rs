@@ -1,7 +1,7 @@
 //! Files in which chunk files may follow an index: which parts of such a file are read.
 //!
-//! In: a reader of an asset source. Out: the bytes of the index, if its chunk files follow and the source can give parts of
-//! the file; else all bytes.
+//! In: a reader of an asset source. Out: the bytes of the index, if its chunk files follow and the source can give
+//! parts of the file; else all bytes.
 
 use crate::codec::package::Following;
 use bevy::asset::io::{AssetSourceId, Reader};
@@ -17,8 +17,8 @@ const FIRST: usize = 1 << 16;
 pub(super) const PIECE: usize = 8 << 20;
 
 /// Which of the sources `http` and `https` give parts of files: those of
-/// [`HttpRangesPlugin`](crate::stream::HttpRangesPlugin), from the first file on that is read through them. Those of Bevy
-/// itself seek in a file that has been received whole.
+/// [`HttpRangesPlugin`](crate::stream::HttpRangesPlugin), from the first file on that is read through them. Those of
+/// Bevy itself seek in a file that has been received whole.
 #[derive(Debug, Clone, Default, Resource)]
 pub(crate) struct PartSources(Arc<[AtomicBool; 2]>);
 
@@ -38,12 +38,12 @@ impl PartSources {
     /// Returns whether a source gives parts of files.
     fn give_parts(&self, source: &AssetSourceId<'_>) -> bool {
         match source {
-            // The files of a page come from a server, whole.
-            AssetSourceId::Default => cfg!(not(target_arch = "wasm32")),
-            AssetSourceId::Name(name) => {
-                let web = Self::NAMES.iter().position(|own| *own == &**name);
-                web.is_none_or(|index| self.0[index].load(Ordering::Relaxed))
-            }
+            // The files of a page and of an Android package are read whole before they seek.
+            AssetSourceId::Default => cfg!(not(any(target_arch = "wasm32", target_os = "android"))),
+            AssetSourceId::Name(name) => match Self::NAMES.iter().position(|own| *own == &**name) {
+                Some(index) => self.0[index].load(Ordering::Relaxed),
+                None => cfg!(not(target_arch = "wasm32")),
+            },
         }
     }
 }

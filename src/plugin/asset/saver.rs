@@ -55,11 +55,6 @@ pub enum CaptureSaveError {
          save it before it is drawn"
     )]
     Released,
-    /// The index of chunk files in one file, without which it is of no use.
-    #[error(
-        "the capture is the index of chunk files in one file, which would be lost: leave the file as it is, unprocessed"
-    )]
-    ChunkFiles,
     /// The format cannot hold the scene.
     #[error(transparent)]
     Package(#[from] PackageError),
@@ -83,9 +78,6 @@ impl AssetSaver for PackageSaver {
     ) -> Result<CaptureLoaderSettings, CaptureSaveError> {
         if capture.is_released() {
             return Err(CaptureSaveError::Released);
-        }
-        if capture.scene().chunks.as_ref().is_some_and(|table| table.first_byte.is_some()) {
-            return Err(CaptureSaveError::ChunkFiles);
         }
         let mut bytes = Vec::new();
         let scene = GaussianScene::from(capture.scene().clone());

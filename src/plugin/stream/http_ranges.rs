@@ -1,8 +1,8 @@
 //! Parts of files from servers: the asset sources `http` and `https`, read by byte ranges.
 //!
-//! In: addresses, positions in files. Out: a [`Reader`] for each file, which asks the server for the bytes that are read, and
-//! no others. A file that is read to its end from its beginning is asked for whole. A server that answers a range with all of
-//! the file gives no parts: then the reader does not seek, and has all bytes.
+//! In: addresses, positions in files. Out: a [`Reader`] for each file, which asks the server for the bytes that are
+//! read, at first for 64 KiB. A file that is read to its end from its beginning is asked for whole. A server that
+//! answers a range with all of the file gives no parts: then the reader does not seek, and has all bytes.
 
 use crate::plugin::asset::PartSources;
 use async_channel::Receiver;
@@ -23,13 +23,14 @@ use std::time::Duration;
 
 /// Bytes that the first request of a file asks for: enough for the index of a capture of a minute.
 const FIRST: u64 = 1 << 16;
-/// A request fails after this time, and a second more for each so many bytes that it asks for.
+/// Outside browsers, the answer with a part has to be received within this time, and a second more for each so many
+/// bytes. Chunk files are asked for again after their own deadline.
 const PATIENCE: Duration = Duration::from_secs(30);
 const LEAST_BYTES_PER_SECOND: u64 = 32 << 10;
 
-/// Loads assets from servers, of captures in one file only the parts that are played: the asset sources `http` and `https`.
-/// Add it before Bevy's `AssetPlugin`, which `DefaultPlugins` has, and leave Bevy's features `http` and `https` off, whose
-/// sources read files whole and would replace these.
+/// Loads assets from servers, of captures in one file only the parts that are played: the asset sources `http` and
+/// `https`. Add it before Bevy's `AssetPlugin`, which `DefaultPlugins` has, and leave Bevy's features `http` and
+/// `https` off, whose sources read files whole and would replace these.
 ///
 /// ```no_run
 /// use bevy::prelude::*;
@@ -91,11 +92,18 @@ impl AssetReader for Server {
     async fn read_meta<'a>(&'a self, path: &'a Path) -> Result<impl Reader + 'a, AssetReaderError> {
         let mut meta = path.as_os_str().to_owned();
         meta.push(".meta");
+        // A query, such as a signature, is that of the file alone.
+        if path.to_string_lossy().contains('?') {
+            return Err(AssetReaderError::NotFound(meta.into()));
+        }
         let mut bytes = Vec::new();
         let read = RangeReader::new(self.url(Path::new(&meta))).read_to_end(&mut bytes).await;
         match read {
             Ok(_) => Ok(VecReader::new(bytes)),
-            Err(error) if error.kind() == ErrorKind::NotFound => Err(AssetReaderError::NotFound(meta.into())),
+            // Buckets forbid what is not there.
+            Err(error) if [ErrorKind::NotFound, ErrorKind::PermissionDenied].contains(&error.kind()) => {
+                Err(AssetReaderError::NotFound(meta.into()))
+            }
             Err(error) => Err(AssetReaderError::Io(error.into())),
         }
     }
@@ -146,7 +154,8 @@ impl RangeReader {
         self.held.length.is_some_and(|length| self.position >= length)
     }
 
-    /// Makes bytes at the position at hand, unless the file ends there: `count` of them, or all up to the end of the file.
+    /// Makes bytes at the position at hand, unless the file ends there: `count` of them, or all up to the end of the
+    /// file.
     fn poll_at_hand(&mut self, context: &mut Context<'_>, count: Option<u64>) -> Poll<Result<(), Error>> {
         while self.at_hand().is_empty() && !self.has_ended() {
             let (url, position) = (&self.url, self.position);
@@ -175,26 +184,33 @@ fn ask(url: &str, position: u64, count: Option<u64>) -> Receiver<Result<Answer, 
         None if position > 0 => request.headers.insert("Range", format!("bytes={position}-")),
         None => {}
     }
-    let is_part = position > 0 || count.is_some();
+    // Those of the page that the app is in.
+    #[cfg(target_arch = "wasm32")]
+    {
+        request.credentials = ehttp::Credentials::SameOrigin;
+    }
     ehttp::fetch(request, move |response| {
         // The reader may be gone.
-        let _ =
-            sender.try_send(response.map_err(Error::other).and_then(|response| answer(response, position, is_part)));
+        let _ = sender.try_send(response.map_err(Error::other).and_then(|response| answer(response, position, count)));
     });
     receiver
 }
 
-/// Returns what a server has sent in answer to a request of the bytes from a position on.
-fn answer(response: Response, position: u64, is_part: bool) -> Result<Answer, Error> {
+/// Returns what a server has sent in answer to a request of bytes from a position on: of `count`, or all to the end.
+fn answer(response: Response, position: u64, count: Option<u64>) -> Result<Answer, Error> {
     let received = response.bytes.len() as u64;
     match response.status {
-        200 => Ok(Answer { start: 0, bytes: response.bytes, length: Some(received), is_whole: is_part }),
+        200 if position > 0 => Err(Error::other("the server sends no parts of the file any more")),
+        200 => Ok(Answer { start: 0, bytes: response.bytes, length: Some(received), is_whole: count.is_some() }),
         206 => {
             let (start, length) = match response.headers.get("content-range").map(content_range) {
                 Some(Some((start, length))) => (start, length),
                 Some(None) => return Err(Error::other("the server has sent a part that it does not describe")),
                 // Browsers show the header of another origin to no page that the server does not list.
-                None => (position, None),
+                None => {
+                    let is_end = count.is_none_or(|count| received < count);
+                    (position, is_end.then(|| position.saturating_add(received)))
+                }
             };
             if start != position || received == 0 {
                 return Err(Error::other("the server has sent another part than was asked for"));
@@ -203,12 +219,17 @@ fn answer(response: Response, position: u64, is_part: bool) -> Result<Answer, Er
         }
         // The file ends before the position.
         416 => Ok(Answer { start: position, bytes: Vec::new(), length: Some(position), is_whole: false }),
+        401 | 403 => {
+            let fault = format!("the server answered {} {}", response.status, response.status_text);
+            Err(Error::new(ErrorKind::PermissionDenied, fault))
+        }
         404 | 410 => Err(Error::new(ErrorKind::NotFound, "the server has no such file")),
         status => Err(Error::other(format!("the server answered {status} {}", response.status_text))),
     }
 }
 
-/// Returns where a part begins and the length of the file, if it is known, of the header `Content-Range: bytes 0-99/1000`.
+/// Returns where a part begins and the length of the file, if it is known, of the header `Content-Range: bytes
+/// 0-99/1000`.
 fn content_range(value: &str) -> Option<(u64, Option<u64>)> {
     let (range, length) = value.trim().strip_prefix("bytes")?.trim_start().split_once('/')?;
     let (first, _) = range.split_once('-')?;
@@ -288,19 +309,26 @@ mod tests {
 
     #[test]
     fn answers_are_parts_of_the_file_or_faults() {
-        let part = answer(response(206, Some("bytes 5-7/100"), b"abc"), 5, true).expect("a part");
+        let three = Some(3);
+        let part = answer(response(206, Some("bytes 5-7/100"), b"abc"), 5, three).expect("a part");
         assert_eq!((part.start, part.length, part.is_whole), (5, Some(100), false), "from the position on");
-        let unknown = answer(response(206, Some("bytes 5-7/*"), b"abc"), 5, true).expect("a part");
+        let unknown = answer(response(206, Some("bytes 5-7/*"), b"abc"), 5, three).expect("a part");
         assert_eq!(unknown.length, None, "of a file of unknown length");
-        assert_eq!(answer(response(206, None, b"abc"), 5, true).expect("a part").start, 5, "not described to the page");
-        let whole = answer(response(200, None, b"abc"), 5, true).expect("all of the file");
+        let length = |count| answer(response(206, None, b"abc"), 5, count).expect("a part").length;
+        assert_eq!([three, Some(4), None].map(length), [None, Some(8), Some(8)], "not described, to the end or before");
+        let whole = answer(response(200, None, b"abc"), 0, three).expect("all of the file");
         assert_eq!((whole.start, whole.length, whole.is_whole), (0, Some(3), true), "in place of a part");
-        assert!(!answer(response(200, None, b"abc"), 0, false).expect("all of the file").is_whole, "as was asked for");
-        let end = answer(response(416, None, b"no"), 5, true).expect("the end");
+        assert!(!answer(response(200, None, b"abc"), 0, None).expect("all of the file").is_whole, "as was asked for");
+        let end = answer(response(416, None, b"no"), 5, three).expect("the end");
         assert_eq!((end.bytes.len(), end.length), (0, Some(5)), "after the end");
-        let fault = |given| answer(given, 5, true).err().expect("a fault");
+        let fault = |given| answer(given, 5, three).err().expect("a fault");
         assert_eq!(fault(response(404, None, b"")).kind(), ErrorKind::NotFound, "no such file");
+        assert_eq!(fault(response(403, None, b"")).kind(), ErrorKind::PermissionDenied, "forbidden");
         assert!(fault(response(503, None, b"")).to_string().contains("503 Said"), "as the server says");
+        assert!(
+            fault(response(200, None, b"abcdefgh")).to_string().contains("no parts"),
+            "all in place of a later part"
+        );
         for (range, bytes) in [("bytes 6-8/100", &b"abc"[..]), ("lines 5-7", b"abc"), ("bytes 5-7/100", b"")] {
             fault(response(206, Some(range), bytes));
         }

@@ -1,8 +1,8 @@
 //! Captures of minutes, streamed: only what is played next is in memory.
 //!
-//! In: a capture whose file is the index of chunk files beside it or after it in one file, as `gs4d split` writes it, from
-//! any Bevy asset source; the [`Playback`](crate::playback::Playback) of its entities; a [`StreamBudget`]. Out: the Gaussians of the
-//! time that is played, drawn; [`CaptureStreamState`], and messages.
+//! In: a capture whose file is the index of chunk files beside it or after it in one file, as `gs4d split` writes it,
+//! from any Bevy asset source; the [`Playback`](crate::playback::Playback) of its entities; a [`StreamBudget`]. Out:
+//! the Gaussians of the time that is played, drawn; [`CaptureStreamState`], and messages.
 //!
 //! ```text
 //! index.gs4d ──▶ GaussianCapture with a table of files

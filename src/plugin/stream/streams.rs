@@ -158,8 +158,8 @@ impl Stream {
             if count > most {
                 let index = server.get_path(own).map(|path| path.to_string()).unwrap_or_default();
                 error_once_each(&format!(
-                    "{index}: its chunk file {}: {count} Gaussians, and the index says {most}, by which memory is counted, so that the \
-                     file is not drawn: copy the index and all files of the capture again",
+                    "{index}: its chunk file {}: {count} Gaussians, and the index says {most}, by which memory is \
+                     counted, so that the file is not drawn: copy the index and all files of the capture again",
                     file + 1
                 ));
             }

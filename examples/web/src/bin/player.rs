@@ -1,9 +1,9 @@
 //! The player of a page, without Bevy.
 //!
-//! In: a canvas, then a file, then cameras and times. Out: pictures on the canvas, of the beginning of a file before all
-//! of it has been received. The page calls [`Player`] from JavaScript (`page/player.js`); nothing here waits: a file is
-//! opened in steps, and the page asks whether the device has finished the last picture. Of an index of chunk files, the
-//! page fetches those that a [`Plan`] names.
+//! In: a canvas, then a file, then cameras and times. Out: pictures on the canvas, of the beginning of a file before
+//! all of it has been received. The page calls [`Player`] from JavaScript (`page/player.js`); nothing here waits: a
+//! file is opened in steps, and the page asks whether the device has finished the last picture. Of an index of chunk
+//! files, the page fetches those that a [`Plan`] names.
 
 use bevy_gs4d::renderer::{
     ActiveList, CaptureUpload, Design, GpuCapture, GpuContext, Instance, Renderer, ShaderChecks, ViewParameters,
@@ -156,8 +156,8 @@ impl Shown {
 }
 
 impl Player {
-    /// Does one step of a file. Returns the file, if there are further steps, and what there is to tell about its capture
-    /// when it is shown.
+    /// Does one step of a file. Returns the file, if there are further steps, and what there is to tell about its
+    /// capture when it is shown.
     ///
     /// # Errors
     /// As [`step`](Self::step).
@@ -354,8 +354,8 @@ impl Player {
         self.share = share;
     }
 
-    /// Begins to open a file, whose length is 0 if it is not known. The capture that is shown stays until the file, or a
-    /// preview of it, is open.
+    /// Begins to open a file, whose length is 0 if it is not known. The capture that is shown stays until the file, or
+    /// a preview of it, is open.
     pub fn open(&mut self, name: &str, length: usize) {
         // The memory of a file that was being opened is free before that of the next is needed.
         (self.opening, self.preview) = (None, None);
@@ -398,8 +398,8 @@ impl Player {
         Ok(about)
     }
 
-    /// Does one step of opening, once all bytes have been received. Returns what there is to tell about the capture when
-    /// it is shown, in place of a preview.
+    /// Does one step of opening, once all bytes have been received. Returns what there is to tell about the capture
+    /// when it is shown, in place of a preview.
     ///
     /// # Errors
     /// A message about a file of an unknown format, a damaged file, or a capture that the device cannot draw.
@@ -457,8 +457,8 @@ impl Player {
         }
     }
 
-    /// Returns where a file is in the file of its index: its first byte, and the byte after its last. `None`: it is beside
-    /// the index.
+    /// Returns where a file is in the file of its index: its first byte, and the byte after its last. `None`: it is
+    /// beside the index.
     pub fn file_range(&mut self, stream: u32, file: u32) -> Option<Vec<f64>> {
         let (_, own) = self.streamed(stream)?;
         own.file_range(file as usize).map(|range| vec![range.start as f64, range.end as f64])

@@ -1,8 +1,8 @@
 //! The player of a page as a Bevy app: the model of a game in a browser.
 //!
 //! In: a canvas, then a file, then cameras and times. Out: pictures on the canvas. The page calls [`Player`] from
-//! JavaScript (`page/player.js`), as it calls the player without Bevy; a system of the app applies the calls. A capture in
-//! chunk files at an address is streamed by the app itself, as in a game.
+//! JavaScript (`page/player.js`), as it calls the player without Bevy; a system of the app applies the calls. A capture
+//! in chunk files at an address is streamed by the app itself, as in a game.
 
 use bevy::asset::AssetMetaCheck;
 use bevy::camera::PerspectiveProjection;
@@ -119,8 +119,8 @@ impl Player {
         self.address = address;
     }
 
-    /// Returns the length of the index, bytes, if chunk files follow it in the file that is being received, and the app can
-    /// fetch them.
+    /// Returns the length of the index, bytes, if chunk files follow it in the file that is being received, and the app
+    /// can fetch them.
     pub fn index_length(&mut self) -> Option<f64> {
         self.address.as_ref()?;
         self.opening.as_mut()?.index_length().map(|length| length as f64)
@@ -161,6 +161,7 @@ impl Player {
                 OpeningStep::Scene(scene) => {
                     let mut about = About::of(&scene);
                     let mut state = self.shared.state();
+                    (state.address, state.place) = (None, None);
                     if let Some(table) = &scene.chunks {
                         let Some(address) = self.address.clone() else {
                             let remedy = "leave engine=bevy out of the link, or join the files by gs4d join";
@@ -170,7 +171,7 @@ impl Player {
                             ));
                         };
                         about.place(table.files.iter().map(|file| file.gaussians).sum(), None);
-                        (state.address, state.place) = (Some(address), None);
+                        state.address = Some(address);
                     }
                     self.about = Some(about);
                     (state.scene, state.shown, state.failed) = (Some(scene), false, None);
@@ -246,10 +247,15 @@ fn apply_calls(
     server: Res<AssetServer>,
     mut captures: ResMut<Assets<GaussianCapture>>,
     mut shown: Query<(Entity, &GaussianCapture3d, &CaptureState, &mut Playback, Option<&Aabb>)>,
+    mut failures: MessageReader<CaptureFailed>,
     mut streamed: Query<&mut CaptureStreamSettings, With<CaptureStreamState>>,
     mut camera: Single<(&mut Transform, &mut Projection), With<Camera3d>>,
 ) {
     let mut state = shared.state();
+    // That files are missing is no state of the entity.
+    if let Some(failed) = failures.read().last().filter(|_| !state.shown) {
+        state.failed = Some(failed.error.to_string());
+    }
     detail.bias = state.detail;
     let [red, green, blue] = state.background.unwrap_or(state.trained);
     let color = Color::srgb(red, green, blue);

@@ -112,7 +112,10 @@ impl Bake {
 impl Figures {
     fn of(info: &PackageInfo) -> Self {
         let header = &info.header;
-        Self { form: header.form.name(), gaussians: header.gaussians, bytes: info.file_length, reported: None }
+        let following = header.chunks.iter().filter(|_| header.chunks_follow).flat_map(|table| &table.files);
+        let following = following.map(|file| file.gaussians as usize).sum::<usize>();
+        let gaussians = header.gaussians + following;
+        Self { form: header.form.name(), gaussians, bytes: info.file_length, reported: None }
     }
 }
 
