@@ -57,7 +57,7 @@ async function pictures(design, shots) {
   const player = await open(`design=${design}&autoplay=0`);
   let opened = '/page/toybox.gs4d';
   for (const [index, shot] of shots.entries()) {
-    if (shot.file.endsWith('index.gs4d')) {
+    if (/\/(index|parts|whole)\.gs4d$/.test(shot.file)) {
       if (shot.file !== opened) await player.page.openAddress(shot.file);
       opened = shot.file;
       // The time interval of the capture is 0 to 1.
