@@ -975,8 +975,9 @@ fn faults_of_chunk_files_in_one_file_are_named() {
     assert!(refusal(&alone).to_string().contains("without a table"), "{}", refusal(&alone));
     let nested = {
         let inner = pack(&index(0));
-        let table = format!("(0, 0, 1, {count}, {})", pack(&in_one_file().0[1]).len());
-        let files = [&files[..files.len() / 2], &inner].concat();
+        let [first, second] = in_one_file().0.map(|scene| pack(&scene).len());
+        let table = format!("(0, 0, 1, {count}, {second})");
+        let files = [&files[..first], &inner].concat();
         with(&table, &format!("(0, 0, 1, {count}, {})", inner.len()), &files)
     };
     assert!(refusal(&nested).to_string().contains("chunk files itself"), "{}", refusal(&nested));
