@@ -366,8 +366,10 @@ async function parts() {
   const requests = () => inside.performance.getEntriesByType('resource').filter((one) => one.name.endsWith('/parts.gs4d')).length;
   results['the file, a byte of it to see whether there are parts, and parts are fetched'] = requests() > 4;
   const streamed = await picture();
-  await page.openAddress('/whole.gs4d');
-  results['a server without parts is named'] = at('said').textContent.includes(`${location.host} sends no parts of files`);
+  const opened = page.openAddress('/whole.gs4d');
+  // What is said stays for four seconds.
+  await until('the server without parts is named', () => at('said').textContent.includes(`${location.host} sends no parts of files`));
+  await opened;
   results['and the capture played whole'] = page.about.gaussians === 4000 && page.thereShare === 1;
   const bytes = new Uint8Array(await (await fetch('/whole.gs4d')).arrayBuffer());
   const before = requests();
