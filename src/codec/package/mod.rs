@@ -114,10 +114,10 @@ pub fn write<W: Write>(writer: W, scene: &GaussianScene, settings: &WriteSetting
     write_with(writer, scene, settings, Role::Whole)
 }
 
-/// As [`write`], of a chunk file: the codebooks of its colors are left to the index of the capture.
+/// As [`write()`], of a chunk file: the codebooks of its colors are left to the index of the capture.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub(crate) fn write_chunk<W: Write>(
     writer: W,
     scene: &GaussianScene,
@@ -126,10 +126,10 @@ pub(crate) fn write_chunk<W: Write>(
     write_with(writer, scene, settings, Role::Chunk)
 }
 
-/// As [`write`], of the index of a capture whose chunk files, in the order of its table, are to be written right after it.
+/// As [`write()`], of the index of a capture whose chunk files, in the order of its table, are to be written right after it.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn write_index<W: Write>(writer: W, scene: &GaussianScene, settings: &WriteSettings) -> Result<(), PackageError> {
     write_with(writer, scene, settings, Role::Index)
 }
