@@ -51,6 +51,7 @@ mod walkthrough;
 mod support {
     pub mod asset_app;
     pub mod blob;
+    pub mod byte_range;
     pub mod cpu_reference;
     pub mod data;
     pub mod event_log;

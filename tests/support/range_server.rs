@@ -3,6 +3,7 @@
 //! In: the bytes of a file, whether parts of it are sent, and which requests fail. Out: an address; what has been asked
 //! for.
 
+use crate::support::byte_range::{parse_range, part_of};
 use std::io::{BufRead, BufReader, Write};
 use std::net::{TcpListener, TcpStream};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -63,14 +64,12 @@ fn answer(stream: TcpStream, file: &[u8], answers: Answers, asked: &Mutex<Vec<As
         reader.read_line(&mut header).ok()?;
         let Some((name, value)) = header.split_once(':') else { break };
         if name.eq_ignore_ascii_case("range") {
-            let (first, last) = value.trim().strip_prefix("bytes=")?.split_once('-')?;
-            let end = if last.is_empty() { file.len() } else { last.parse::<usize>().ok()? + 1 };
-            range = Some((first.parse().ok()?, end.min(file.len())));
+            range = Some(parse_range(value, file.len())?);
         }
     }
     let stream = reader.get_mut();
     if path != "/take.gs4d" {
-        return send(stream, "404 Not Found", "", b"");
+        return send(stream, "404 Not Found", b"");
     }
     let parts = {
         let mut asked = locked(asked);
@@ -79,22 +78,19 @@ fn answer(stream: TcpStream, file: &[u8], answers: Answers, asked: &Mutex<Vec<As
     };
     match range {
         Some(_) if answers.fail_every > 0 && parts.is_multiple_of(answers.fail_every) => {
-            send(stream, "503 Service Unavailable", "", b"")
+            send(stream, "503 Service Unavailable", b"")
         }
-        Some((first, end)) if !answers.no_parts => match file.get(first..end) {
-            Some(part) if !part.is_empty() => {
-                let described = format!("Content-Range: bytes {first}-{}/{}\r\n", end - 1, file.len());
-                send(stream, "206 Partial Content", &described, part)
-            }
-            _ => send(stream, "416 Range Not Satisfiable", "", b""),
-        },
-        _ => send(stream, "200 OK", "", file),
+        Some(range) if !answers.no_parts => {
+            let (status, part) = part_of(file, range);
+            send(stream, &status, part)
+        }
+        _ => send(stream, "200 OK", file),
     }
 }
 
-fn send(stream: &mut TcpStream, status: &str, more: &str, body: &[u8]) -> Option<()> {
+fn send(stream: &mut TcpStream, status: &str, body: &[u8]) -> Option<()> {
     let length = body.len();
-    let head = format!("HTTP/1.1 {status}\r\nContent-Length: {length}\r\n{more}Connection: close\r\n\r\n");
+    let head = format!("HTTP/1.1 {status}\r\nContent-Length: {length}\r\nConnection: close\r\n\r\n");
     stream.write_all(head.as_bytes()).ok()?;
     stream.write_all(body).ok()
 }

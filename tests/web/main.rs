@@ -13,6 +13,7 @@ mod take;
 
 #[path = "../support"]
 mod support {
+    pub mod byte_range;
     #[expect(dead_code, reason = "the player is compared with the CPU reference, not with the original's values")]
     pub mod golden;
     pub mod skip;

@@ -10,6 +10,7 @@
 
 use crate::browser::Browser;
 use crate::shots::{Shot, listed};
+use crate::support::byte_range::{parse_range, part_of};
 use crate::take::Take;
 use bevy_gs4d::scene::ChunkTable;
 use std::collections::{BTreeMap, BTreeSet};
@@ -152,11 +153,7 @@ fn answer(
         let Some((name, value)) = header.split_once(':') else { continue };
         match name.to_ascii_lowercase().as_str() {
             "content-length" => length = value.trim().parse().ok()?,
-            "range" => {
-                let (first, last) = value.trim().strip_prefix("bytes=")?.split_once('-')?;
-                let last = if last.is_empty() { usize::MAX - 1 } else { last.parse().ok()? };
-                range = Some((first.parse::<usize>().ok()?, last));
-            }
+            "range" => range = Some(value.to_owned()),
             _ => {}
         }
     }
@@ -188,12 +185,8 @@ fn answer(
         Some("jpg") => "image/jpeg",
         _ => "application/octet-stream",
     };
-    if let Some((first, last)) = range.filter(|_| path == "/parts.gs4d") {
-        let end = bytes.len().min(last + 1);
-        let Some(part) = bytes.get(first..end).filter(|part| !part.is_empty()) else {
-            return write(reader.get_mut(), "416 Range Not Satisfiable", "text/plain", b"");
-        };
-        let status = format!("206 Partial Content\r\nContent-Range: bytes {first}-{}/{}", end - 1, bytes.len());
+    if let Some(range) = range.filter(|_| path == "/parts.gs4d") {
+        let (status, part) = part_of(&bytes, parse_range(&range, bytes.len())?);
         return write(reader.get_mut(), &status, kind, part);
     }
     write(reader.get_mut(), "200 OK", kind, &bytes)

@@ -3,8 +3,7 @@
 //! In: a capture, the length of a stretch of time, the shares of its layers; or a packed capture, which has been cut when
 //! it was compressed; perhaps a dataset, on whose validation views layers are measured. Out: a folder with a package for
 //! each layer of each run of Gaussians that are alive in the same stretches, and an index of them, or one file of the index
-//! and these packages; a report of the times and
-//! the size of each, and of the bit rates and the utilities of layers.
+//! and these packages; a report of the times and the size of each, and of the bit rates and the utilities of layers.
 
 use super::info::bit_rate;
 use crate::cli::args::{CheckpointArgs, DataArgs, EngineArgs, Given, Need, ValidationArgs, file_size, values};

@@ -137,11 +137,11 @@ impl Split {
         let (index, settings) = (folder.join(ChunkTable::INDEX), write_settings(&segment.scene.form, level));
         remove_index(&index)?;
         let mut files = Vec::with_capacity(self.parts.len());
-        for (number, path) in self.paths(folder).into_iter().enumerate() {
+        for (part, path) in self.parts.iter().zip(self.paths(folder)) {
             proceed(progress)?;
-            save_chunk(&path, &self.chunk(&segment.scene, number), &settings)?;
+            save_chunk(&path, &chunk_of(&segment.scene, part, files.is_empty()), &settings)?;
             let bytes = fs::metadata(&path).map_err(|error| FileError::at(&path, error))?.len();
-            files.push(self.written(&segment.scene, number, path, bytes));
+            files.push(self.written(&segment.scene, part, path, bytes));
             progress.advance();
         }
         proceed(progress)?;
@@ -174,12 +174,11 @@ impl Split {
         progress.begin("writing", self.parts.len() + 1);
         let settings = write_settings(&segment.scene.form, level);
         let (mut files, mut bodies) = (Vec::with_capacity(self.parts.len()), Vec::with_capacity(self.parts.len()));
-        for number in 0..self.parts.len() {
+        for part in &self.parts {
             proceed(progress)?;
-            let mut body = Vec::new();
-            let written = package::write_chunk(&mut body, &self.chunk(&segment.scene, number), &settings);
-            written.map_err(|error| FileError::at(path, error))?;
-            files.push(self.written(&segment.scene, number, path.to_owned(), body.len() as u64));
+            let (mut body, chunk) = (Vec::new(), chunk_of(&segment.scene, part, bodies.is_empty()));
+            package::write_chunk(&mut body, &chunk, &settings).map_err(|error| FileError::at(path, error))?;
+            files.push(self.written(&segment.scene, part, path.to_owned(), body.len() as u64));
             bodies.push(body);
             progress.advance();
         }
@@ -193,21 +192,9 @@ impl Split {
         Ok(Chunks { index: path.to_owned(), table: ChunkTable { first_byte, ..table }, files })
     }
 
-    /// Returns the scene of a chunk file.
-    fn chunk(&self, scene: &GaussianScene, number: usize) -> GaussianScene {
-        let mut chunk = scene.select(self.parts.get(number).map(|part| part.gaussians.as_slice()).unwrap_or_default());
-        // All chunks have one environment map, and the same sockets and colliders, in the first file.
-        if number > 0 {
-            chunk.environment = None;
-            chunk.sockets.clear();
-            chunk.colliders = None;
-        }
-        GaussianScene { sound: None, ..chunk }
-    }
-
     /// Returns what is known of a chunk file that has been written.
-    fn written(&self, scene: &GaussianScene, number: usize, path: PathBuf, bytes: u64) -> Chunk {
-        let Part { stretches, layer, ref gaussians } = self.parts[number];
+    fn written(&self, scene: &GaussianScene, part: &Part, path: PathBuf, bytes: u64) -> Chunk {
+        let Part { stretches, layer, ref gaussians } = *part;
         let file = ChunkFile { stretches, layer, gaussians: gaussians.len() as u64, bytes };
         Chunk { path, times: self.times(scene, stretches), file }
     }
@@ -230,6 +217,18 @@ impl Split {
         let time = |stretch: u32| first + (last - first) * f64::from(stretch) / f64::from(self.stretches);
         [time(stretches[0]), time(stretches[1] + 1)]
     }
+}
+
+/// Returns the scene of a chunk file.
+fn chunk_of(scene: &GaussianScene, part: &Part, is_first: bool) -> GaussianScene {
+    let mut chunk = scene.select(&part.gaussians);
+    // All chunks have one environment map, and the same sockets and colliders, in the first file.
+    if !is_first {
+        chunk.environment = None;
+        chunk.sockets.clear();
+        chunk.colliders = None;
+    }
+    GaussianScene { sound: None, ..chunk }
 }
 
 /// Returns the index of a capture in chunk files.
