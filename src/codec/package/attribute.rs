@@ -6,6 +6,9 @@
 use crate::scene::PackedScene;
 use std::ops::Range;
 
+/// Fewest rows of which one byte of each component is compressed as a block of its own.
+const ROWS_OF_A_BLOCK: usize = 256;
+
 /// One attribute of all Gaussians, or of another part of a scene: a column of a table of words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Attribute {
@@ -31,6 +34,13 @@ impl Attribute {
     /// Returns the uncompressed bytes of `rows` rows.
     pub(super) fn raw_length(&self, rows: usize) -> u64 {
         (rows as u64).saturating_mul(self.width as u64 * 4)
+    }
+
+    /// Returns the number of bytes after which a block of the compressed planes of `rows` rows ends: those of one byte of
+    /// one component, or all of few rows and of tables that all Gaussians share.
+    pub(super) fn block_length(&self, rows: usize) -> usize {
+        let is_shared = matches!(self.name, "packed_ranges" | "codebooks" | "codebook_scales");
+        if is_shared || rows < ROWS_OF_A_BLOCK { usize::MAX } else { rows }
     }
 
     /// Returns some of its rows in runs of at most `length`.

@@ -45,7 +45,7 @@ pub(super) fn encode(
     level: i32,
 ) -> Result<(Section, Vec<u8>), PackageError> {
     let planes = planes::split(words, attribute, rows.clone());
-    let mut body = zstd_frames::compress(&planes, level)?;
+    let mut body = zstd_frames::compress(&planes, attribute.block_length(rows.len()), level)?;
     // All bodies stay in memory until the table is complete.
     body.shrink_to_fit();
     let section = Section {
