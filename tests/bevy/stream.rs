@@ -20,7 +20,9 @@ use bevy::prelude::*;
 use bevy::render::renderer::RenderDevice;
 use bevy::time::TimeUpdateStrategy;
 use bevy_gs4d::codec::stream::StreamSchedule;
-use bevy_gs4d::playback::{Clip, ClipFade, FollowsClock, PlaybackClock, Timeline, TimelinePlayer, Track};
+use bevy_gs4d::playback::{
+    Clip, ClipFade, FollowsClock, PlaybackClock, Timeline, TimelinePlayer, TimelineTrack, Track,
+};
 use bevy_gs4d::prelude::*;
 use bevy_gs4d::render::CaptureSettings;
 use bevy_gs4d::scene::ChunkTable;
@@ -193,6 +195,45 @@ fn the_next_clip_of_a_timeline_is_loaded_before_it_begins() {
     let between: BTreeSet<usize> = needed(2.2).difference(&of_clips).copied().collect();
     assert!(!between.is_empty(), "the capture has files that no clip plays");
     assert!(names(between).all(|name| !gate.reads().contains_key(&name)), "what no clip plays is not loaded");
+}
+
+#[test]
+fn a_timeline_waits_for_a_track_that_is_seen_and_stalls() {
+    for (on_underrun, is_seen) in [(OnUnderrun::Stall, true), (OnUnderrun::Stall, false), (OnUnderrun::Coarse, true)] {
+        let mut stage = Stage::new();
+        stage.gate.let_through(names(coarse(0.0)));
+        let app = &mut stage.app;
+        let capture: Handle<GaussianCapture> = app.world().resource::<AssetServer>().load(INDEX);
+        let end = if is_seen { SECONDS } else { 1.0 };
+        let streamed = Clip { capture, start: 0.0, range: [0.0, end], speed: 1.0, fade: [0.0; 2] };
+        let capture = playback_app::capture(app, SECONDS, 4);
+        let whole = Clip { capture, range: [0.0, SECONDS], ..streamed.clone() };
+        let tracks = [("streamed", streamed), ("whole", whole)]
+            .map(|(name, clip)| Track { name: name.into(), clips: vec![clip] });
+        let timeline = Timeline::new(tracks.into(), Vec::new(), None).expect("a timeline");
+        let timeline = app.world_mut().resource_mut::<Assets<Timeline>>().add(timeline);
+        let settings = CaptureStreamSettings { on_underrun, ..default() };
+        let track = (TimelineTrack("streamed".into()), settings);
+        let player = app.world_mut().spawn((TimelinePlayer(timeline), children![track])).id();
+        let case = format!("{on_underrun:?}, seen: {is_seen}");
+        let track = app.world().get::<Children>(player).expect("the track")[0];
+        until(app, "the first picture", |app| stream(app, track).is_coarse);
+        pass(app, 0.25);
+        assert_eq!(time(app, player), 0.25, "{case}: the timeline plays");
+
+        seek(app, player, LATE);
+        pass(app, 0.02);
+        pass(app, 0.02);
+        let then = time(app, player);
+        pass(app, 0.1);
+        let waits = on_underrun == OnUnderrun::Stall && is_seen;
+        assert_eq!(time(app, player) == then, waits, "{case}: at {then} s, then {} s", time(app, player));
+        stage.gate.open();
+        until(app, "a coarse picture", |app| stream(app, track).is_coarse);
+        let then = time(app, player);
+        pass(app, 0.1);
+        assert!(time(app, player) > then, "{case}: time passes");
+    }
 }
 
 #[test]

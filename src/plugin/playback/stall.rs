@@ -4,6 +4,11 @@
 
 use bevy::ecs::component::Component;
 
-/// Whether no time passes for a playback, because what it would draw is not there. A followed clock does not wait.
+/// Who waits for what a playback would draw and is not there. A clock that is followed never waits.
 #[derive(Component, Debug, Default, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Stall(pub(crate) bool);
+pub(crate) struct Stall {
+    /// Whether no time passes for the playback.
+    pub(crate) waits: bool,
+    /// Whether no time passes for the timeline of which the playback is a track, unless the track is hidden.
+    pub(crate) holds_timeline: bool,
+}

@@ -74,7 +74,7 @@ pub(super) fn advance_captures(
         let (id, mut state) = (handle.0.id(), state.clone());
         let Some(capture) = captures.get(id) else { continue };
         state.play_asset(id.untyped());
-        let awaited = stall.is_some_and(|stall| stall.0)
+        let awaited = stall.is_some_and(|stall| stall.waits)
             || state.is_unplayed() && (uploads.awaits(id) || uploads.is_blank(id, capture));
         let shown = |clock: Entity| {
             let by_player = |(playback, state): (&Playback, &PlaybackState)| Shown::by_player(playback, state);

@@ -86,7 +86,7 @@ pub(super) fn begin_pictures(
 ) {
     for (entity, handle) in &placed {
         if streams.of(handle.0.id()).is_some() {
-            commands.entity(entity).try_insert((Showing::default(), Stall(true)));
+            commands.entity(entity).try_insert((Showing::default(), Stall { waits: true, ..Stall::default() }));
         }
     }
 }
@@ -134,10 +134,10 @@ pub(super) fn show_pictures(
             warn_once_each(&fault.to_string());
             announcer.failed(entity, fault);
         }
-        if had_picture && waits && !stall.0 {
+        if had_picture && waits && !stall.waits {
             announcer.stalled(entity, playback.time);
         }
-        stall.set_if_neq(Stall(waits));
+        stall.set_if_neq(Stall { waits, holds_timeline: waits && on_underrun == OnUnderrun::Stall });
         picture.set_if_neq(showing.picture(stream, index, &captures));
         state.set_if_neq(CaptureStreamState {
             seconds: showing.shown,

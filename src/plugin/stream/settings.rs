@@ -70,7 +70,8 @@ pub struct CaptureStreamSettings {
 #[type_path = "bevy_gs4d::stream"]
 #[non_exhaustive]
 pub enum OnUnderrun {
-    /// Playback waits, and the last picture stays.
+    /// Playback waits, and the last picture stays. The timeline of a track that is seen waits with it, also before the
+    /// first picture of a clip.
     Stall,
     /// The last picture stays, and time passes.
     Hold,

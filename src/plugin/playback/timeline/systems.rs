@@ -13,13 +13,14 @@ use crate::plugin::playback::clock::{FollowsClock, PlaybackClock};
 use crate::plugin::playback::component::Playback;
 use crate::plugin::playback::drive::{Following, Shown};
 use crate::plugin::playback::messages::Announcer;
+use crate::plugin::playback::stall::Stall;
 use crate::plugin::playback::state::PlaybackState;
 use bevy::asset::{AssetServer, Assets, LoadState, UntypedAssetId};
 use bevy::camera::visibility::Visibility;
 use bevy::ecs::change_detection::{DetectChangesMut, Mut};
 use bevy::ecs::entity::Entity;
 use bevy::ecs::hierarchy::{ChildOf, Children};
-use bevy::ecs::query::Without;
+use bevy::ecs::query::{With, Without};
 use bevy::ecs::system::{Commands, Query, Res};
 use bevy::log::debug_span;
 use bevy::time::Time;
@@ -50,8 +51,8 @@ pub(in crate::plugin::playback) fn bind_tracks(
 }
 
 /// Advances the playheads, followed players before their followers. Captures advance later: a timeline that follows a
-/// capture is one frame behind. Playback begins once the captures of all clips can be drawn
-/// and the sounds are loaded.
+/// capture is one frame behind. Playback begins once the captures of all clips can be drawn and the sounds are loaded,
+/// and waits for a track that is seen and stalls.
 pub(in crate::plugin::playback) fn advance_timelines(
     time: Res<Time>,
     timelines: Res<Assets<Timeline>>,
@@ -61,30 +62,43 @@ pub(in crate::plugin::playback) fn advance_timelines(
     following: Following,
     clocks: Query<&PlaybackClock, Without<TimelinePlayer>>,
     others: Query<(&Playback, &PlaybackState), Without<TimelinePlayer>>,
-    mut players: Query<(Entity, &TimelinePlayer, &mut Playback, &mut PlaybackState, &mut PlaybackClock)>,
+    stalls: Query<(&Stall, &Visibility), With<TimelineTrack>>,
+    mut players: Query<(
+        Entity,
+        &TimelinePlayer,
+        &mut Playback,
+        &mut PlaybackState,
+        &mut PlaybackClock,
+        Option<&Children>,
+    )>,
     mut announcer: Announcer,
 ) {
     let _span = debug_span!("gs4d/timelines").entered();
     let order = following.order(players.iter().map(|(entity, ..)| entity));
     for player in order {
         let (id, mut state) = match players.get(player) {
-            Ok((_, handle, _, state, _)) if timelines.contains(&handle.0) => (handle.0.id(), state.clone()),
+            Ok((_, handle, _, state, ..)) if timelines.contains(&handle.0) => (handle.0.id(), state.clone()),
             Ok(_) | Err(_) => continue,
         };
         state.play_asset(id.untyped());
         let shown = |leader: Entity| {
-            let by_timeline = players.get(leader).ok().map(|(.., clock)| Shown::by_clock(clock));
+            let by_timeline = players.get(leader).ok().map(|(.., clock, _)| Shown::by_clock(clock));
             let by_clock = || clocks.get(leader).ok().map(Shown::by_clock);
             let by_player = || others.get(leader).ok().map(|(playback, state)| Shown::by_player(playback, state));
             by_timeline.or_else(by_clock).or_else(by_player)
         };
         let drive = following.drive(player, &time, shown, &mut state);
-        let Ok((entity, handle, mut playback, mut kept, mut clock)) = players.get_mut(player) else { continue };
+        let Ok((entity, handle, mut playback, mut kept, mut clock, children)) = players.get_mut(player) else {
+            continue;
+        };
         let Some(timeline) = timelines.get(&handle.0) else { continue };
         let mut clips = timeline.tracks().iter().flat_map(|track| &track.clips);
-        let awaited = state.is_unplayed()
-            && (clips.any(|clip| awaits(clip, &captures, &uploads, &server))
-                || timeline.sounds().iter().any(|clip| loads(clip.sound.id(), &server)));
+        let holds =
+            |(stall, visibility): (&Stall, &Visibility)| stall.holds_timeline && visibility != Visibility::Hidden;
+        let awaited = children.is_some_and(|children| stalls.iter_many(children).any(holds))
+            || state.is_unplayed()
+                && (clips.any(|clip| awaits(clip, &captures, &uploads, &server))
+                    || timeline.sounds().iter().any(|clip| loads(clip.sound.id(), &server)));
         let jumps = state.jumps;
         let (next, progress) = state.advance(*playback, drive.unless(awaited), timeline.duration_seconds());
         playback.set_if_neq(next);
