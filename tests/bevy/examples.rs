@@ -15,7 +15,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use tempfile::TempDir;
 
-const EXAMPLES: [&str; 8] = ["minimal", "play", "scene", "timeline", "walkthrough", "headless", "budget", "sound"];
+const EXAMPLES: [&str; 9] =
+    ["minimal", "play", "scene", "timeline", "walkthrough", "headless", "budget", "sound", "sockets"];
 
 /// Returns the path of an example: tests are in the folder `deps` next to `examples`.
 fn program(example: &str) -> PathBuf {
@@ -116,6 +117,45 @@ fn budget_writes_pictures() {
 
 #[test]
 #[ignore = "takes minutes; `.ci/full` runs it"]
+fn sockets_hold_violet_hats_that_move() {
+    let violet = |picture: &RgbaImage| {
+        let violet = picture.enumerate_pixels().filter(|(.., pixel)| {
+            let [red, green, blue, _] = pixel.0;
+            blue > 100 && red > blue / 3 && green < red / 2
+        });
+        violet.map(|(x, y, _)| (x, y)).collect::<Vec<_>>()
+    };
+    let Some(pictures) = pictures(Path::new(ROOT), "sockets", &[], 2) else { return };
+    check("sockets", &pictures, 2);
+    let [first, second] = [0, 1].map(|index| violet(&pictures[index]));
+    assert!(first.len() > 150, "three hats are seen, in {} pixels", first.len());
+    let moved = first.iter().filter(|pixel| !second.contains(pixel)).count();
+    assert!(moved > 20 && moved < first.len(), "two of them move with the lanterns: {moved} of {} pixels", first.len());
+}
+
+#[test]
+fn sockets_says_how_a_capture_gets_them() {
+    if !has_gpu() {
+        no_gpu();
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let target = folder.path().join("pictures");
+    let target = target.to_str().expect("temporary folders have plain names");
+    for (place, named) in [("", "gs4d socket"), ("50,0,0,0.5", "the point 50,0,0 at 0.5"), ("1,2", "X,Y,Z,T")] {
+        let places: &[&str] = if place.is_empty() { &[] } else { &["--place", place] };
+        let output = run("sockets", &[&["toybox.gs4d", "--headless", target][..], places].concat());
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(!output.status.success(), "sockets --place {place} fails");
+        assert!(
+            said.lines().any(|line| line.starts_with("Error") && line.contains(named)),
+            "sockets --place {place} says what to do:\n{said}"
+        );
+    }
+}
+
+#[test]
+#[ignore = "takes minutes; `.ci/full` runs it"]
 fn stream_measures_chunk_files_and_writes_pictures() {
     if !has_gpu() {
         no_gpu();
@@ -179,7 +219,8 @@ fn invisible() -> TempDir {
 #[ignore = "takes minutes; `.ci/full` runs it"]
 fn every_example_writes_pictures_that_show_its_captures_and_change() {
     let invisible = invisible();
-    for example in EXAMPLES {
+    // A capture that is transparent has nothing that a socket can follow.
+    for example in EXAMPLES.into_iter().filter(|&example| example != "sockets") {
         let roots = [Path::new(ROOT), invisible.path()];
         // In the first picture the timeline's capture has not yet faded in.
         let frames = if example == "timeline" { 4 } else { 2 };
