@@ -7,7 +7,8 @@
 //!
 //! The hats on sockets that the package has, as `gs4d socket` places them, are yellow. Each `--place` adds a violet one
 //! on what is at the point X,Y,Z of the capture at the time T, a timestamp. Without a capture, the lanterns of the
-//! bundled island have hats, and a stone at the fire. A hat vanishes while its socket is lost.
+//! bundled island have hats, and a stone at the fire. A hat vanishes while its socket is lost, and a violet one when
+//! the file is loaded again.
 //!
 //! There are no keys. With `--headless FOLDER`, or without a display, it writes N (8) pictures, half a second apart, to
 //! FOLDER (`out`) instead.
@@ -21,7 +22,7 @@ use bevy_gs4d::offline::sockets::{Placement, follow};
 use bevy_gs4d::offline::work::NoProgress;
 use bevy_gs4d::playback::SocketState;
 use bevy_gs4d::prelude::*;
-use bevy_gs4d::scene::{GaussianScene, RuntimeScene};
+use bevy_gs4d::scene::{GaussianScene, RuntimeScene, Socket};
 use bevy_gs4d::testing;
 use common::{Orbit, arguments};
 use std::path::PathBuf;
@@ -130,6 +131,9 @@ fn put_on_hats(
     orbit.place(&mut place, &mut lens);
     let file = show.capture.display().to_string();
     let with_sockets = match with_sockets(loaded.scene(), &show.points) {
+        Ok(scene) if scene.chunks.is_some() => {
+            Err(format!("{file}: is in chunk files: name the capture that gs4d split has cut"))
+        }
         Ok(scene) if scene.sockets.is_empty() => {
             Err(format!("{file}: has no sockets: place one with gs4d socket, or a point with --place X,Y,Z,T"))
         }
@@ -169,9 +173,9 @@ fn put_on_hats(
 fn with_sockets(loaded: &RuntimeScene, points: &[[f32; 4]]) -> std::result::Result<RuntimeScene, String> {
     let mut scene = loaded.clone();
     let whole = GaussianScene::from(loaded.clone());
-    let samples = ((RATE * loaded.playback.duration_seconds).ceil() as usize).max(1) + 1;
-    for (index, &[x, y, z, time]) in points.iter().enumerate() {
-        let placement = Placement { name: format!("point {}", index + 1), position: [x, y, z], time, samples };
+    let samples = ((RATE * loaded.playback.duration_seconds).ceil() as usize).clamp(1, Socket::MOST_SAMPLES - 2) + 1;
+    for &[x, y, z, time] in points {
+        let placement = Placement { name: format!("{x},{y},{z} at {time}"), position: [x, y, z], time, samples };
         let followed = follow(&whole, &placement, &mut NoProgress);
         let followed = followed.map_err(|error| format!("the point {x},{y},{z} at {time}: {error}"))?;
         scene.sockets.push(followed.socket);

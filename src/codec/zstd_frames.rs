@@ -142,8 +142,8 @@ pub(crate) fn decompress(frame: &[u8], limit: usize) -> io::Result<Vec<u8>> {
 }
 
 /// Compresses bytes into a frame. `level` is from 1 (fast) to 19 (small). A block ends after every `run` bytes, for
-/// bytes that consist of runs of similar ones: a block has one code for all its bytes, and libzstd by itself does not
-/// end blocks between runs in which nothing repeats. A block takes some 3 to 60 bytes.
+/// bytes that consist of runs of similar ones: a block has one code for all its bytes, and libzstd by itself seldom ends
+/// blocks between runs in which nothing repeats.
 ///
 /// # Errors
 /// Too little memory.

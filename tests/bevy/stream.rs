@@ -198,13 +198,13 @@ fn the_next_clip_of_a_timeline_is_loaded_before_it_begins() {
 }
 
 #[test]
-fn a_timeline_waits_for_a_track_that_is_seen_and_stalls() {
-    for (on_underrun, is_seen) in [(OnUnderrun::Stall, true), (OnUnderrun::Stall, false), (OnUnderrun::Coarse, true)] {
+fn a_timeline_waits_for_a_track_that_shows_a_clip_and_stalls() {
+    for (on_underrun, is_shown) in [(OnUnderrun::Stall, true), (OnUnderrun::Stall, false), (OnUnderrun::Coarse, true)] {
         let mut stage = Stage::new();
         stage.gate.let_through(names(coarse(0.0)));
         let app = &mut stage.app;
         let capture: Handle<GaussianCapture> = app.world().resource::<AssetServer>().load(INDEX);
-        let end = if is_seen { SECONDS } else { 1.0 };
+        let end = if is_shown { SECONDS } else { 1.0 };
         let streamed = Clip { capture, start: 0.0, range: [0.0, end], speed: 1.0, fade: [0.0; 2] };
         let capture = playback_app::capture(app, SECONDS, 4);
         let whole = Clip { capture, range: [0.0, SECONDS], ..streamed.clone() };
@@ -215,7 +215,7 @@ fn a_timeline_waits_for_a_track_that_is_seen_and_stalls() {
         let settings = CaptureStreamSettings { on_underrun, ..default() };
         let track = (TimelineTrack("streamed".into()), settings);
         let player = app.world_mut().spawn((TimelinePlayer(timeline), children![track])).id();
-        let case = format!("{on_underrun:?}, seen: {is_seen}");
+        let case = format!("{on_underrun:?}, shown: {is_shown}");
         let track = app.world().get::<Children>(player).expect("the track")[0];
         until(app, "the first picture", |app| stream(app, track).is_coarse);
         pass(app, 0.25);
@@ -226,7 +226,8 @@ fn a_timeline_waits_for_a_track_that_is_seen_and_stalls() {
         pass(app, 0.02);
         let then = time(app, player);
         pass(app, 0.1);
-        let waits = on_underrun == OnUnderrun::Stall && is_seen;
+        let waits = on_underrun == OnUnderrun::Stall && is_shown;
+        assert!(!is_shown || !stream(app, track).is_coarse, "{case}: the files of {LATE} s are missing");
         assert_eq!(time(app, player) == then, waits, "{case}: at {then} s, then {} s", time(app, player));
         stage.gate.open();
         until(app, "a coarse picture", |app| stream(app, track).is_coarse);

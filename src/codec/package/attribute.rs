@@ -36,11 +36,11 @@ impl Attribute {
         (rows as u64).saturating_mul(self.width as u64 * 4)
     }
 
-    /// Returns the number of bytes after which a block of the compressed planes of `rows` rows ends: those of one byte of
-    /// one component, or all of few rows and of tables that all Gaussians share.
+    /// Returns the number of bytes after which a block of the compressed planes of `rows` rows ends: those of one byte
+    /// of one component, or all where a code for each costs more than it saves: of few rows, and of tables.
     pub(super) fn block_length(&self, rows: usize) -> usize {
-        let is_shared = matches!(self.name, "packed_ranges" | "codebooks" | "codebook_scales");
-        if is_shared || rows < ROWS_OF_A_BLOCK { usize::MAX } else { rows }
+        let is_table = matches!(self.name, "packed_ranges" | "codebooks" | "codebook_scales");
+        if is_table || rows < ROWS_OF_A_BLOCK { usize::MAX } else { rows }
     }
 
     /// Returns some of its rows in runs of at most `length`.

@@ -126,7 +126,8 @@ pub(crate) fn write_chunk<W: Write>(
     write_with(writer, scene, settings, Role::Chunk)
 }
 
-/// As [`write()`], of the index of a capture whose chunk files, in the order of its table, are to be written right after it.
+/// As [`write()`], of the index of a capture whose chunk files, in the order of its table, are to be written right after
+/// it.
 ///
 /// # Errors
 /// As [`write()`].

@@ -126,10 +126,10 @@ pub(super) fn show_pictures(
             _ => {}
         }
         showing.is_buffering = !coverage.is_coarse;
-        if showing.is_buffering
-            && !showing.is_fault_reported
-            && let Some(fault) = stream.fault(id, playback.time.into())
-        {
+        let fault = showing.is_buffering.then(|| stream.fault(id, playback.time.into())).flatten();
+        // What is missing may never come: other tracks of a timeline do not wait for it.
+        let holds_timeline = waits && on_underrun == OnUnderrun::Stall && fault.is_none();
+        if let Some(fault) = fault.filter(|_| !showing.is_fault_reported) {
             showing.is_fault_reported = true;
             warn_once_each(&fault.to_string());
             announcer.failed(entity, fault);
@@ -137,7 +137,7 @@ pub(super) fn show_pictures(
         if had_picture && waits && !stall.waits {
             announcer.stalled(entity, playback.time);
         }
-        stall.set_if_neq(Stall { waits, holds_timeline: waits && on_underrun == OnUnderrun::Stall });
+        stall.set_if_neq(Stall { waits, holds_timeline });
         picture.set_if_neq(showing.picture(stream, index, &captures));
         state.set_if_neq(CaptureStreamState {
             seconds: showing.shown,

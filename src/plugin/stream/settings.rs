@@ -70,8 +70,8 @@ pub struct CaptureStreamSettings {
 #[type_path = "bevy_gs4d::stream"]
 #[non_exhaustive]
 pub enum OnUnderrun {
-    /// Playback waits, and the last picture stays. The timeline of a track that is seen waits with it, also before the
-    /// first picture of a clip.
+    /// Playback waits, and the last picture stays. The timeline of a track that shows a clip waits with it, also before
+    /// the first picture of the clip, unless the timeline follows a clock, or a file cannot be read or does not fit.
     Stall,
     /// The last picture stays, and time passes.
     Hold,

@@ -52,7 +52,7 @@ pub(in crate::plugin::playback) fn bind_tracks(
 
 /// Advances the playheads, followed players before their followers. Captures advance later: a timeline that follows a
 /// capture is one frame behind. Playback begins once the captures of all clips can be drawn and the sounds are loaded,
-/// and waits for a track that is seen and stalls.
+/// and waits for a track that shows a clip and stalls.
 pub(in crate::plugin::playback) fn advance_timelines(
     time: Res<Time>,
     timelines: Res<Assets<Timeline>>,
