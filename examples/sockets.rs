@@ -129,20 +129,10 @@ fn put_on_hats(
     let orbit = Orbit::around(loaded);
     let (mut place, mut lens) = camera.into_inner();
     orbit.place(&mut place, &mut lens);
-    let file = show.capture.display().to_string();
-    let with_sockets = match with_sockets(loaded.scene(), &show.points) {
-        Ok(scene) if scene.chunks.is_some() => {
-            Err(format!("{file}: is in chunk files: name the capture that gs4d split has cut"))
-        }
-        Ok(scene) if scene.sockets.is_empty() => {
-            Err(format!("{file}: has no sockets: place one with gs4d socket, or a point with --place X,Y,Z,T"))
-        }
-        Ok(scene) => Ok(scene),
-        Err(fault) => Err(format!("{file}: {fault}")),
-    };
-    let scene = match with_sockets {
+    let scene = match with_sockets(loaded.scene(), &show.points) {
         Ok(scene) => scene,
         Err(fault) => {
+            let fault = format!("{}: {fault}", show.capture.display());
             error!("{fault}");
             show.outcome = Some(Err(fault));
             return;
@@ -169,8 +159,11 @@ fn put_on_hats(
 /// Returns a capture with a socket for each of these points as well. Games have them in the package.
 ///
 /// # Errors
-/// A point that cannot be followed, as a sentence.
+/// A capture in chunk files, a point that cannot be followed, a capture without sockets: as a sentence.
 fn with_sockets(loaded: &RuntimeScene, points: &[[f32; 4]]) -> std::result::Result<RuntimeScene, String> {
+    if loaded.chunks.is_some() {
+        return Err("is in chunk files: name the capture that gs4d split has cut".into());
+    }
     let mut scene = loaded.clone();
     let whole = GaussianScene::from(loaded.clone());
     let samples = ((RATE * loaded.playback.duration_seconds).ceil() as usize).clamp(1, Socket::MOST_SAMPLES - 2) + 1;
@@ -179,6 +172,9 @@ fn with_sockets(loaded: &RuntimeScene, points: &[[f32; 4]]) -> std::result::Resu
         let followed = follow(&whole, &placement, &mut NoProgress);
         let followed = followed.map_err(|error| format!("the point {x},{y},{z} at {time}: {error}"))?;
         scene.sockets.push(followed.socket);
+    }
+    if scene.sockets.is_empty() {
+        return Err("has no sockets: place one with gs4d socket, or a point with --place X,Y,Z,T".into());
     }
     Ok(scene)
 }
