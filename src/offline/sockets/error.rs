@@ -22,13 +22,13 @@ pub enum SocketError {
         /// The last time of the capture, timestamp units.
         last: f32,
     },
-    /// Too few Gaussians are visible near the point.
+    /// No Gaussian, or too few that agree, is visible at the point.
     #[error(
         "nothing that can be followed is visible within {distance} units of the point at the time {time}: place it on \
          what it is to follow, at a time at which that is visible"
     )]
     NothingThere {
-        /// The distance within which Gaussians are followed, capture units.
+        /// The distance within which they are looked for, capture units.
         distance: f32,
         /// The time, timestamp units.
         time: f32,

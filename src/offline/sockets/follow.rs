@@ -19,6 +19,8 @@ const FEWEST: usize = 4;
 const SUPPORT: f64 = 3.0;
 /// Smallest and largest distance within which neighbors are, as parts of the size of the capture.
 const REACH: [f64; 2] = [0.02, 0.1];
+/// Largest distance from a point to what it is placed on, as a part of the size of the capture.
+const NEAREST: f64 = 0.01;
 /// Factor by which neighbors may be farther away than at the start, where the capture becomes thin.
 const THINNER: f64 = 2.0;
 /// Largest estimate of the error, as a part of the size of the capture: beyond, the point is lost.
@@ -35,7 +37,7 @@ const STEPS: f64 = 256.0;
 pub struct Placement {
     /// The name of the socket.
     pub name: String,
-    /// The position, capture space: on or in the part that is followed.
+    /// The position, capture space: on the part that is followed, within 1 % of the capture's size.
     pub position: [f32; 3],
     /// The time at which the position is meant, timestamp units.
     pub time: f32,
@@ -156,10 +158,14 @@ impl<'a> Follower<'a> {
     /// Returns the follower of a point.
     ///
     /// # Errors
-    /// Too few Gaussians that agree are near it.
+    /// It is on no Gaussian, or too few that agree are near it.
     fn placed(cloud: &'a Cloud, start: &SocketSample) -> Result<Self, SocketError> {
         let [least, most] = REACH.map(|part| part * cloud.size);
         let (place, time) = (Vec3::from(start.position).as_dvec3(), f64::from(start.time));
+        let nearest = NEAREST * cloud.size;
+        if !cloud.touches(place, time, nearest) {
+            return Err(SocketError::NothingThere { distance: nearest as f32, time: start.time });
+        }
         let Near { neighbors, radius } = cloud.near(place, time, most);
         let sum: f64 = neighbors.iter().map(|neighbor| neighbor.weight).sum();
         let squares = neighbors.iter().map(|neighbor| neighbor.weight * neighbor.at(time).distance_squared(place));
@@ -325,8 +331,9 @@ mod tests {
     fn what_stands_is_followed_without_error() {
         let mut random = Random::new(3);
         let mut still = || Vec3::from([(); 3].map(|()| random.in_range(-1.0, 1.0)));
-        let gaussians = (0..900).map(|_| gaussian(still(), 0.0, Vec3::ZERO, f32::INFINITY)).collect();
-        let found = followed(&scene(gaussians), &placement(DVec3::ZERO, 0.0, 11)).expect("it is there");
+        let means = std::iter::once(Vec3::ZERO).chain((0..900).map(|_| still()));
+        let gaussians = means.map(|mean| gaussian(mean, 0.0, Vec3::ZERO, f32::INFINITY));
+        let found = followed(&scene(gaussians.collect()), &placement(DVec3::ZERO, 0.0, 11)).expect("it is there");
         assert_eq!((found.lost, found.returns), ([None; 2], [None, Some(0.0)]), "to the end of the interval and back");
         let at_rest = |sample: &SocketSample| (sample.position, sample.error) == ([0.0; 3], 0.0);
         assert!(found.socket.samples.iter().all(at_rest), "it does not move: {:?}", found.socket);
@@ -362,6 +369,9 @@ mod tests {
         let refusal = |placement: Placement| followed(&body, &placement).expect_err("must be refused");
         let far = refusal(Placement { position: [9.0, 0.0, 0.0], ..good.clone() });
         assert!(matches!(far, SocketError::NothingThere { .. }), "far from everything: {far}");
+        let beside = place(DVec3::ZERO, 0.2) + 0.75 * DVec3::X;
+        let beside = refusal(Placement { position: beside.as_vec3().to_array(), ..good.clone() });
+        assert!(matches!(beside, SocketError::NothingThere { .. }), "beside the body, whose radius is 0.5: {beside}");
         let late = refusal(placement(DVec3::ZERO, 0.95, 5));
         assert!(matches!(late, SocketError::NothingThere { .. }), "after the end of everything: {late}");
         let outside = refusal(Placement { time: 1.5, ..good.clone() });

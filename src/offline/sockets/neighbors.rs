@@ -8,13 +8,16 @@ use super::motion::Neighbor;
 use crate::codec::import::columns::SH_C0;
 use crate::gaussian::{Gaussian, Harmonics, InvalidGaussian, lifespan_reach};
 use crate::scene::{Bounds, Form, GaussianScene, SceneForm, TrainedWith};
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Mat3, Vec3};
 use rayon::prelude::*;
 
 /// Number of neighbors: enough that the noise of single velocities averages out, few enough to be of one part.
 const COUNT: usize = 48;
 /// Smallest opacity at the time at which a Gaussian counts: fainter ones are haze or the remains of pruning.
 const FAINTEST: f32 = 0.02;
+
+/// Standard deviations up to which a Gaussian is seen.
+const SEEN: f32 = 2.0;
 
 /// The Gaussians of a capture that can be followed.
 pub(super) struct Cloud {
@@ -111,6 +114,21 @@ impl Cloud {
         Near { neighbors: neighbors.collect(), radius }
     }
 
+    /// Returns whether a point in capture space is on a Gaussian that is drawn at `time` (timestamp units), or about
+    /// `distance` (capture units) beside it: within [`SEEN`] standard deviations of the Gaussian, widened by that.
+    pub(super) fn touches(&self, place: DVec3, time: f64, distance: f64) -> bool {
+        let (at, now) = (place.as_vec3(), time as f32);
+        let wider = (distance as f32 / SEEN).powi(2);
+        self.pieces.par_iter().any(|Piece { gaussian, drawn: [first, last], .. }| {
+            let is_drawn = (*first..=*last).contains(&now) && gaussian.opacity * gaussian.marginal(now) > FAINTEST;
+            let offset = gaussian.mean_at(now) - at;
+            let [xx, xy, xz, yy, yz, zz] = gaussian.covariance;
+            let columns = [[xx + wider, xy, xz], [xy, yy + wider, yz], [xz, yz, zz + wider]];
+            let covariance = Mat3::from_cols_array_2d(&columns);
+            is_drawn && offset.dot(covariance.inverse() * offset) <= SEEN * SEEN
+        })
+    }
+
     /// Returns the colors of the Gaussians that are drawn at `time` (timestamp units) around a point in capture space,
     /// weighted by their opacity at that time and by their distance, with a standard deviation of `radius` (capture
     /// units).
@@ -139,5 +157,24 @@ fn colors(scene: &GaussianScene) -> Vec<Vec3> {
         (SceneForm::Ready(Form::Packed(packed)), _) => all(&packed.clone().unpack().harmonics),
         (_, Some(harmonics)) => all(harmonics),
         _ => Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fixture::{gaussian, scene};
+    use super::*;
+
+    #[test]
+    fn points_are_on_gaussians_in_their_directions() {
+        let disk =
+            Gaussian { covariance: [1.0, 0.0, 0.0, 1.0, 0.0, 1e-6], ..gaussian(Vec3::ZERO, 0.5, Vec3::ZERO, 0.1) };
+        let cloud = Cloud::of(&scene(vec![disk])).expect("it can be drawn");
+        let touches = |place: [f64; 3], time| cloud.touches(DVec3::from(place), time, 0.1);
+        assert!(touches([1.9, 0.0, 0.05], 0.5), "on the disk");
+        assert!(!touches([0.0, 0.0, 0.3], 0.5), "above it");
+        assert!(!touches([1.0, 0.0, 1.0], 0.5), "above it and aside");
+        assert!(!touches([2.2, 0.0, 0.0], 0.5), "beside it");
+        assert!(!touches([0.0; 3], 0.0), "before it is drawn");
     }
 }
