@@ -3,21 +3,23 @@
 //!
 //! ```text
 //! cargo run --release --features viewer --example budget -- [CAPTURE] [--copies N] [--cameras N | --stereo] \
-//!     [--milliseconds T | --share S] [--size WIDTHxHEIGHT] [--settle N] [--play] [--headless FOLDER] [--frames N]
+//!     [--milliseconds T | --share S] [--least L] [--size WIDTHxHEIGHT] [--settle N] [--play] [--headless FOLDER] \
+//!     [--frames N]
 //! ```
 //!
 //! * up and down: a quarter more time, a fifth less; B: budget on and off
 //!
 //! The title of the window has the budget, the time that captures take, and the Gaussians that are drawn. Defaults:
 //! `toybox.gs4d` from `assets/`, 8 copies, 4 milliseconds of the GPU in a frame, 640x360, one camera. `--cameras N`: 1
-//! to 4 cameras side by side, each in its own column of the picture; `--stereo`: two eyes. Needs a GPU with timestamps.
+//! to 4 cameras side by side, each in its own column of the picture; `--stereo`: two eyes. `--least L`: the share of
+//! the Gaussians, from 0 to 1, that is drawn in any case. Needs a GPU with timestamps.
 //!
 //! With `--headless FOLDER`, or without a display, it draws `--settle` frames (300) without the budget, as many until
 //! the picture has settled, and as many again, and prints the median and the 99th percentile of their times. With
 //! `--share S`, from 0 to 1, the budget is that part of the median without a budget. Captures stand still; with
 //! `--play` they play, a 60th of a second in a frame. Then it draws the first moment 24 times, prints how much that
-//! still view changes from a frame to the next, and writes N (8) pictures, a 30th of a second apart, to FOLDER (`out`).
-//! The last line, `result:`, has the numbers for scripts.
+//! still view changes from a frame to the next, and the times of the passes of a frame, and writes N (8) pictures, a
+//! 30th of a second apart, to FOLDER (`out`). The last line, `result:`, has the numbers for scripts.
 
 #[path = "common/arguments.rs"]
 mod arguments;
@@ -47,6 +49,8 @@ const STEP: Duration = Duration::from_nanos(1_000_000_000 / 60);
 const ASIDE: f32 = 0.3;
 /// Frames of a still view that are compared.
 const STILL: u32 = 24;
+/// Frames in which passes are timed.
+const TIMED: u32 = 20;
 /// Frames before these: buffers grow by the counts of an earlier frame.
 const UNCOMPARED: u32 = 4;
 
@@ -56,6 +60,8 @@ struct Options {
     gpu_time: Option<Duration>,
     /// The budget as a part of the median time without a budget.
     share: Option<f64>,
+    /// The smallest share of the Gaussians that is drawn.
+    least: Option<f32>,
     cameras: Option<u32>,
     stereo: bool,
     play: bool,
@@ -79,6 +85,13 @@ impl Options {
                     return Err(format!("--share {share}: not a number from 0 to 1").into());
                 }
                 self.share = Some(share);
+            }
+            "--least" => {
+                let least: f32 = number(option, values)?;
+                if !(0.0..=1.0).contains(&least) {
+                    return Err(format!("--least {least}: not a number from 0 to 1").into());
+                }
+                self.least = Some(least);
             }
             "--cameras" => {
                 let cameras: u32 = number(option, values)?;
@@ -117,8 +130,15 @@ impl Options {
         if self.stereo { Views::Eyes } else { Views::Columns(self.cameras.unwrap_or(1)) }
     }
 
-    /// Returns the budget. `free` is the median time without a budget, in milliseconds.
-    fn budget(&self, free: f64) -> Result<Duration> {
+    /// Returns the budget of a time, with the least share of the command line.
+    fn budget_of(&self, gpu_time: Duration) -> CaptureBudget {
+        let unlimited = CaptureBudget::default();
+        let least_share = self.least.unwrap_or(unlimited.least_share);
+        CaptureBudget { gpu_time: Some(gpu_time), least_share, ..unlimited }
+    }
+
+    /// Returns the time of the budget. `free` is the median time without a budget, in milliseconds.
+    fn time(&self, free: f64) -> Result<Duration> {
         match self.share {
             Some(_) if free == 0.0 => Err("there is no share of an unknown time: leave out --share".into()),
             Some(share) => Ok(Duration::try_from_secs_f64(share * free * 1e-3)?),
@@ -160,6 +180,7 @@ fn main() -> Result {
         copies: 8,
         gpu_time: None,
         share: None,
+        least: None,
         cameras: None,
         stereo: false,
         play: false,
@@ -175,13 +196,13 @@ fn main() -> Result {
         let files = AssetPlugin { unapproved_path_mode: UnapprovedPathMode::Allow, ..default() };
         let mut app = App::new();
         app.add_plugins(DefaultPlugins.set(files)).add_systems(Update, (keys, title));
-        build(&mut app, copies, options.views(), options.gpu_time.unwrap_or(GPU_TIME));
+        build(&mut app, copies, options.views(), options.budget_of(options.gpu_time.unwrap_or(GPU_TIME)));
         app.run();
         return Ok(());
     };
     let mut app = testing::app(options.size);
     // Times are measured, and nothing is left out.
-    build(&mut app, copies, options.views(), Duration::MAX);
+    build(&mut app, copies, options.views(), options.budget_of(Duration::MAX));
     testing::settle(&mut app)?;
     let result = report(&mut app, &options)?;
     save_pictures(&mut app, arguments.frames, Duration::from_secs_f64(1.0 / 30.0), &folder)?;
@@ -194,12 +215,12 @@ fn number<T: std::str::FromStr>(option: &str, values: &mut dyn Iterator<Item = S
     Ok(text.parse().map_err(|_| format!("{option} {text}: not a number"))?)
 }
 
-fn build(app: &mut App, copies: Copies, views: Views, gpu_time: Duration) {
+fn build(app: &mut App, copies: Copies, views: Views, budget: CaptureBudget) {
     app.add_plugins(GaussianCapturePlugins)
         .insert_resource(ClearColor(Color::BLACK))
         .insert_resource(copies)
         .insert_resource(views)
-        .insert_resource(CaptureBudget { gpu_time: Some(gpu_time), ..default() })
+        .insert_resource(budget)
         .add_systems(Startup, (spawn_copies, spawn_cameras));
     // A single camera needs no viewport.
     if let Views::Columns(2..) = views {
@@ -297,6 +318,24 @@ fn drawn(statistics: &CaptureStatistics) -> String {
     format!("{time:.2} ms, {visible} Gaussians, left out below {:.3} px", statistics.cut())
 }
 
+/// Describes the times of the passes, summed over all cameras: of one of the frames that are drawn with timestamps
+/// between passes, which take time, too.
+fn passes(app: &mut App, step: Duration) -> Result<String> {
+    let statistics = app.world().resource::<CaptureStatistics>().clone();
+    statistics.measure(true);
+    draw(app, TIMED, step)?;
+    statistics.measure(false);
+    let mut times: Vec<(&str, f64)> = Vec::new();
+    for pass in statistics.views().iter().flat_map(|(_, view)| &view.passes) {
+        match times.iter_mut().find(|(name, _)| *name == pass.name) {
+            Some((_, time)) => *time += pass.milliseconds,
+            None => times.push((pass.name, pass.milliseconds)),
+        }
+    }
+    let times: Vec<String> = times.iter().map(|(name, time)| format!("{name} {time:.3}")).collect();
+    Ok(format!("passes, timed one by one: {} ms", times.join(", ")))
+}
+
 /// Returns the number of Gaussians that are drawn, summed over all cameras.
 fn visible(statistics: &CaptureStatistics) -> u32 {
     statistics.views().iter().map(|(_, view)| view.visible).sum()
@@ -311,9 +350,9 @@ fn report(app: &mut App, options: &Options) -> Result<String> {
     if free == 0.0 {
         println!("no times: this GPU has no timestamps");
     }
-    println!("without a budget: median {free:.2} ms; {}", drawn(&statistics));
+    println!("without a budget: median {free:.2} ms; {}; {}", drawn(&statistics), passes(app, step)?);
     let all = visible(&statistics);
-    let budget = options.budget(free)?;
+    let budget = options.time(free)?;
     let whole = still_pictures(app, 1)?.remove(0);
     app.world_mut().resource_mut::<CaptureBudget>().gpu_time = Some(budget);
     draw(app, frames, step)?;
@@ -326,6 +365,7 @@ fn report(app: &mut App, options: &Options) -> Result<String> {
     let least = if least.is_finite() { format!("{least:.1} dB") } else { "identical".into() };
     println!("least PSNR between two frames of a still view: {least}");
     println!("a still view changes by at most {change:.2} dB between two frames");
+    println!("{}", passes(app, step)?);
     Ok(format!(
         "copies={} cameras={} stereo={} free_ms={free:.3} target_ms={wanted:.3} median_ms={median:.3} \
          p99_ms={most:.3} settled_share={share:.3} change_db={change:.3}",

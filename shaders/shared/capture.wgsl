@@ -32,7 +32,7 @@ var<private> instance: InstanceUniforms;
 // the copy is read.
 @group(1) @binding(1) var<storage, read> lifespans: array<vec2<f32>>;
 #endif
-// The list that `activate` writes; read only with a filter.
+// The lists that `activate` writes, that of this instance from `first_listed` on; read only with a filter.
 @group(2) @binding(0) var<storage, read> active_list: array<u32>;
 
 // Returns the index of the Gaussian of a slot of this part.

@@ -106,7 +106,8 @@ const DEBUG_VELOCITY: u32 = 5u;
 
 // Input of `activate` for one part of a capture.
 struct Activation {
-    // Number of Gaussians in this part, or in its pages that are listed, and first entry of this part in the list.
+    // Number of Gaussians in this part, or in its pages that are listed, and first entry of this part in the
+    // buffer of the list.
     count: u32,
     first: u32,
     // FILTER_*

@@ -2,10 +2,12 @@
 //!
 //! In: a capture with a temporal filter and a time. Out: the indices of the Gaussians that are active in the segment of
 //! that time, ascending, part by part; of a capture in chunk files, in the order of the files. `activate` writes them only
-//! when the segment, or the files that are there, have changed.
+//! when the segment, or the files that are there, have changed. The lists of several placements of a capture are in one
+//! buffer, so that one dispatch draws them.
 
 use super::capture::{Filter, GpuCapture, PartListing, Prefix};
 use super::layout::{Activation, BLOCK, INSTANCE_STRIDE, PAGE};
+use super::list_rooms::ListPlace;
 use super::pipelines::Renderer;
 use wgpu::BufferUsages;
 
@@ -22,8 +24,7 @@ pub struct ActiveList {
     /// The pages that are listed, part after part.
     pages: wgpu::Buffer,
     activate: wgpu::BindGroup,
-    /// Bind group of the list, which `project` reads.
-    pub(super) list: wgpu::BindGroup,
+    place: ListPlace,
 }
 
 impl ActiveList {
@@ -31,12 +32,12 @@ impl ActiveList {
     pub fn new(device: &wgpu::Device, renderer: &Renderer, capture: &GpuCapture) -> Option<Self> {
         let most = capture.filter.as_ref()?.most;
         let allocator = renderer.allocator(device);
+        let place = capture.lists.place(device, renderer, most);
         let count: u64 = capture.parts.iter().map(|part| u64::from(part.count)).sum();
         let count = count.max(1).next_multiple_of(u64::from(BLOCK));
         let pages = capture.pages.as_ref().map_or(1, |paged| u64::from(paged.count()));
         let parts = capture.parts.len().max(1) as u64;
         let uniforms = allocator.buffer("gs4d activations", parts * u64::from(INSTANCE_STRIDE), BufferUsages::UNIFORM);
-        let list = allocator.buffer("gs4d active list", u64::from(most.max(1)) * 4, BufferUsages::STORAGE);
         let pages = allocator.buffer("gs4d active pages", pages * 4, BufferUsages::STORAGE);
         let blocks = allocator.buffer("gs4d active blocks", count / u64::from(BLOCK) * 4, BufferUsages::STORAGE);
         let uniform = wgpu::BindingResource::Buffer(wgpu::BufferBinding {
@@ -44,12 +45,26 @@ impl ActiveList {
             offset: 0,
             size: std::num::NonZeroU64::new(size_of::<Activation>() as u64),
         });
-        let of_list = [&list, &blocks, &pages].map(wgpu::Buffer::as_entire_binding);
+        let of_list = [place.buffer(), &blocks, &pages].map(wgpu::Buffer::as_entire_binding);
         let resources = [[uniform].as_slice(), &of_list].concat();
         let activate = allocator.bind_group("gs4d activate", &renderer.layouts.activate, &resources);
-        let list = allocator.bind_group("gs4d active list", &renderer.layouts.active, &[list.as_entire_binding()]);
         let (prepared, listing) = (None, Vec::new());
-        Some(Self { capture: capture.id, prepared, recorded: false, listing, uniforms, pages, activate, list })
+        Some(Self { capture: capture.id, prepared, recorded: false, listing, uniforms, pages, activate, place })
+    }
+
+    /// Returns the bind group with the list, which the passes of a frame read.
+    pub(super) fn group(&self) -> &wgpu::BindGroup {
+        self.place.group()
+    }
+
+    /// Returns the index of the first entry of the list in its bind group.
+    pub(super) fn first(&self) -> u32 {
+        self.place.first()
+    }
+
+    /// Returns whether one bind group has this list and another one.
+    pub(super) fn is_beside(&self, other: &Self) -> bool {
+        self.place.is_beside(&other.place)
     }
 
     /// Returns whether the list belongs to this upload of a capture. If not, create a new list.
@@ -70,7 +85,7 @@ impl ActiveList {
             self.listing = capture.pages.as_ref().map(|paged| paged.listing(segments)).unwrap_or_default();
             let pages: Vec<u32> = self.listing.iter().flat_map(|part| &part.pages).copied().collect();
             queue.write_buffer(&self.pages, 0, bytemuck::cast_slice(&pages));
-            let (mut first, mut first_page) = (0, 0);
+            let (mut first, mut first_page) = (self.first(), 0);
             for (index, part) in capture.parts.iter().enumerate() {
                 let listing = self.listing.get(index);
                 let activation = Activation {

@@ -77,7 +77,7 @@ pub struct InstanceUniforms {
     pub time_span: f32,
     /// 1: the Gaussians of the active list are drawn; 0: all.
     pub listed: u32,
-    /// First entry of this part in that list.
+    /// First entry of this part in the buffer of that list.
     pub first_listed: u32,
     /// Number of codebooks of color; 0 if the coefficients are whole.
     pub stages: u32,
@@ -168,7 +168,7 @@ pub const LIGHTING_LINEAR: u32 = 2;
 pub struct Activation {
     /// Gaussians in this part, or in its pages that are listed.
     pub count: u32,
-    /// First entry of this part in the list.
+    /// First entry of this part in the buffer of the list.
     pub first: u32,
     /// `FILTER_*`.
     pub filter_mode: u32,

@@ -38,8 +38,8 @@
 //!
 //! Passes are compiled when a view first needs them. In an app ([`Renderer::compiling_in_background`]) another thread does this: captures appear
 //! once the passes of their storage are compiled, and a view whose lists, bins or batches have changed draws with the variant that it has,
-//! which draws the same picture, until the better one is compiled. A view with other targets or other surfaces (HDR, samples, debug views)
-//! has no such variant, and compiles its passes at once.
+//! which draws the same picture, until the better one is compiled. A view with other targets or other surfaces (HDR, samples, debug views),
+//! or whose bins are to be counted for the first time, has no such variant, and compiles its passes at once.
 //!
 //! Mesa's software driver ends all loops of a thread after 65,535 iterations. There `blend` blends many splats in an iteration if a view has
 //! many, and frames of tile bins that may exceed the iterations are drawn with the global sort: [`Headless`] draws such a frame
@@ -56,6 +56,7 @@ mod headless;
 mod iterations;
 pub(crate) mod layout;
 mod layouts;
+mod list_rooms;
 mod passes;
 mod pipelines;
 pub(crate) mod shaders;
@@ -74,5 +75,5 @@ pub use headless::Headless;
 pub use pipelines::Renderer;
 pub use shaders::{ColorPrecision, ShaderChecks, Storage};
 pub use statistics::ViewStatistics;
-pub use timing::{PassTime, Timings};
+pub use timing::{Measured, PassTime, Timings};
 pub use view::ViewRenderer;

@@ -19,8 +19,8 @@ pub struct ViewStatistics {
     pub bytes: u64,
     /// Bytes of the working buffers that all views share, since they are drawn one after another.
     pub shared_bytes: u64,
-    /// GPU time of each pass, in frame order; a single time named `frame` if the device has no timestamps inside passes; empty until it has
-    /// been measured.
+    /// GPU time of each pass, in frame order; a single time named `frame` if frames are
+    /// [measured](super::Measured) as a whole; empty until it has been measured.
     pub passes: Vec<PassTime>,
 }
 

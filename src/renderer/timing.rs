@@ -9,6 +9,19 @@ use std::sync::atomic::{AtomicU32, Ordering};
 /// The name of the only time of a frame that is timed as a whole.
 pub(super) const WHOLE_FRAME: &[&str] = &["frame"];
 
+/// How the GPU time of the frames of a view is measured.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Measured {
+    /// Not at all.
+    #[default]
+    Nothing,
+    /// The frame as a whole, by two timestamps: a single time named `frame`.
+    Frame,
+    /// Each pass. Timestamps between passes take time, and passes that run at the same time otherwise run one after the other. The frame as a
+    /// whole, if the device has no timestamps inside passes.
+    Passes,
+}
+
 /// Medians over the frames of a benchmark.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Timings {

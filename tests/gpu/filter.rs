@@ -110,6 +110,48 @@ fn inactive_gaussians_are_not_drawn() {
 }
 
 #[test]
+fn copies_of_several_times_are_drawn_with_the_list_of_each() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let whole = scene(400, 9);
+    let [plain, filtered] =
+        [&whole, &with_support(&whole)].map(|scene| headless.upload(scene).expect("the scene fits the GPU"));
+    // More copies than one dispatch draws, at several places.
+    let seen = |index: usize| {
+        let eye = Vec3::new(3.0 - 0.6 * (index % 10) as f32, -6.0, 2.0 - 0.5 * (index / 10) as f32);
+        let time = (index * 37 % 100) as f32 / 100.0;
+        Camera::look_at(eye, eye + Vec3::Y, Vec3::Z, 0.9, UVec2::new(90, 61)).view(time, RasterFov::Reference)
+    };
+    let views: Vec<View> = (0..80).map(seen).collect();
+    let mut lists: Vec<_> = views.iter().map(|view| headless.active(&filtered, view.time)).collect();
+    // Lists that end leave their places to others.
+    for index in [3, 40, 41, 70] {
+        lists[index] = None;
+    }
+    for index in [41, 3, 70, 40] {
+        lists[index] = headless.active(&filtered, views[index].time);
+    }
+    assert!(lists.iter().all(Option::is_some), "the capture has a filter");
+    let parameters = ViewParameters { background: BLACK, depths: false, ..ViewParameters::default() };
+    for (_, design) in Design::NAMES {
+        headless.set_design(design);
+        let mut draw = |filtered_too: bool| {
+            let instance = |index: usize| {
+                let (capture, active) = if filtered_too { (&filtered, lists[index].as_ref()) } else { (&plain, None) };
+                Instance { capture, active, view: views[index], appearance: Appearance::default() }
+            };
+            let instances: Vec<Instance<'_>> = (0..views.len()).map(instance).collect();
+            headless.render_all(&instances, &parameters).expect("the view is drawn")
+        };
+        let (expected, found) = (draw(false), draw(true));
+        assert!(expected.counts.visible > 2_000, "{design:?}: the copies are visible: {:?}", expected.counts);
+        assert_eq!(found.counts, expected.counts, "{design:?}: the same numbers of splats and pairs");
+        let apart = found.picture.pixels.iter().zip(&expected.picture.pixels);
+        let apart = apart.map(|(a, b)| (*a - *b).abs().max_element()).fold(0.0, f32::max);
+        assert!(apart <= 1e-6, "{design:?}: colors differ by {apart}");
+    }
+}
+
+#[test]
 fn captures_with_and_without_a_filter_are_drawn_in_one_view() {
     let Some(mut headless) = gpu::headless() else { return };
     let (a, b) = (scene(2_000, 7), scene(2_500, 8));

@@ -50,6 +50,7 @@ pub(super) fn show(ui: &mut egui::Ui, passes: &[PassTime], cut: f32, measuring: 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::renderer::Measured;
 
     #[test]
     fn closing_the_section_does_not_stop_measurements_of_the_game() {
@@ -57,13 +58,17 @@ mod tests {
         statistics.measure(true);
         for open in [true, false] {
             panel.follow(open, &statistics);
-            assert!(statistics.is_measuring(), "the game's measurement continues, open: {open}");
+            assert_eq!(statistics.measured(), Measured::Passes, "the game's measurement continues, open: {open}");
         }
         statistics.measure(false);
-        assert!(!statistics.is_measuring(), "measuring ends when the game stops it");
+        assert_eq!(statistics.measured(), Measured::Nothing, "measuring ends when the game stops it");
         for open in [true, false] {
             panel.follow(open, &statistics);
-            assert_eq!(statistics.is_measuring(), open, "the panel measures only while the section is open");
+            assert_eq!(
+                statistics.measured() == Measured::Passes,
+                open,
+                "the panel measures only while the section is open"
+            );
         }
     }
 }

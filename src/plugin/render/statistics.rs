@@ -2,7 +2,7 @@
 //!
 //! In: the counts and times of the render world. Out: [`CaptureStatistics`], a resource that both worlds share.
 
-use crate::renderer::{ViewStatistics, WorkCounters};
+use crate::renderer::{Measured, ViewStatistics, WorkCounters};
 use bevy::ecs::entity::Entity;
 use bevy::ecs::reflect::ReflectResource;
 use bevy::ecs::resource::Resource;
@@ -53,8 +53,8 @@ struct Shared {
 
 impl CaptureStatistics {
     /// Starts or stops measuring the GPU time of each pass. The first times arrive some frames later; on a GPU without
-    /// timestamps no times arrive. The inspector also measures while it shows these times, and so does a
-    /// [`CaptureBudget`](super::CaptureBudget) of GPU time. Default: not measured.
+    /// timestamps no times arrive. The inspector also measures while it shows these times. A
+    /// [`CaptureBudget`](super::CaptureBudget) of GPU time measures frames as a whole. Default: not measured.
     pub fn measure(&self, on: bool) {
         self.lock().measure = on;
     }
@@ -130,9 +130,16 @@ impl CaptureStatistics {
         self.lock().renderer_missing = why;
     }
 
-    pub(crate) fn is_measuring(&self) -> bool {
+    /// Returns how GPU time is measured.
+    pub(crate) fn measured(&self) -> Measured {
         let shared = self.lock();
-        shared.measure || shared.measure_for_panel || shared.measure_for_budget
+        if shared.measure || shared.measure_for_panel {
+            Measured::Passes
+        } else if shared.measure_for_budget {
+            Measured::Frame
+        } else {
+            Measured::Nothing
+        }
     }
 
     /// Replaces the numbers by those of a new frame: the statistics of each camera that sees captures or holds memory

@@ -11,6 +11,7 @@ use super::prefixes::Prefixes;
 use crate::renderer::device::GpuError;
 use crate::renderer::device::memory::{Allocator, binding_limit};
 use crate::renderer::layout::{self, BLOCK, InstanceUniforms};
+use crate::renderer::list_rooms::ListRooms;
 use crate::renderer::pipelines::Renderer;
 use crate::renderer::shaders::Storage;
 use crate::scene::filter::segment_of;
@@ -29,6 +30,8 @@ pub struct GpuCapture {
     /// Identifies this upload within the process.
     pub(in crate::renderer) id: u64,
     pub(in crate::renderer) filter: Option<Filter>,
+    /// The buffers of the lists of its placements.
+    pub(in crate::renderer) lists: ListRooms,
     /// The pages of its buffers, if its Gaussians are in chunk files.
     pub(in crate::renderer) pages: Option<PagedGaussians>,
     /// Of its Gaussians, those that a thinned capture needs.
@@ -195,6 +198,7 @@ impl GpuCapture {
             storage,
             id: next_id(),
             filter: None,
+            lists: ListRooms::default(),
             pages: None,
             prefixes: Prefixes::of(scene),
             bytes,

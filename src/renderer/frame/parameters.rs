@@ -37,10 +37,15 @@ impl Instance<'_> {
         listed_count(self.capture, part, self.active, prefix)
     }
 
-    /// Returns whether one dispatch can draw this instance and the next: both draw all Gaussians of the same capture, which has one part.
+    /// Returns whether one dispatch can draw this instance and the next: of the same capture, which has one part, both draw all Gaussians, or
+    /// both have a list, in one buffer.
     pub(in crate::renderer) fn joins(&self, next: &Self) -> bool {
-        let draws_all = self.active.is_none() && next.active.is_none();
-        std::ptr::eq(self.capture, next.capture) && self.capture.parts.len() == 1 && draws_all
+        let reads_alike = match (self.active, next.active) {
+            (None, None) => true,
+            (Some(active), Some(other)) => active.is_beside(other),
+            _ => false,
+        };
+        std::ptr::eq(self.capture, next.capture) && self.capture.parts.len() == 1 && reads_alike
     }
 }
 

@@ -35,30 +35,31 @@ impl Recording<'_> {
         }
     }
 
-    /// Records one dispatch of `project`, `project_bin` or `colors` for each part of each instance, or for several consecutive instances of
-    /// the same Gaussians. `groups` returns the number of workgroups for a storage and a number of Gaussians; `pipeline` returns the pipeline
+    /// Records one dispatch of `project`, `project_bin` or `colors` for each part of each instance, or for several consecutive instances
+    /// that [join](Instance::joins). `groups` returns the number of workgroups of an instance for a storage, a number of Gaussians
+    /// and the number of instances of the dispatch; `pipeline` returns the pipeline
     /// for a storage and one or (`true`) several instances.
     pub(in crate::renderer) fn dispatch_parts<'a>(
         &self,
         pass: &mut wgpu::ComputePass<'_>,
         pipeline: impl Fn(Storage, bool) -> Option<&'a wgpu::ComputePipeline>,
         group: &wgpu::BindGroup,
-        groups: impl Fn(Storage, u32) -> u32,
+        groups: impl Fn(Storage, u32, u32) -> u32,
     ) {
         let mut index = 0;
         for joined in self.instances.chunk_by(Instance::joins) {
-            // Consecutive instances of the same Gaussians in one dispatch: wgpu inserts a barrier between two dispatches.
+            // Consecutive instances of one capture in one dispatch: wgpu inserts a barrier between two dispatches.
             for batch in joined.chunks(INSTANCES_AT_ONCE as usize) {
                 let (instance, count) = (&batch[0], batch.len() as u32);
                 let Some(pipeline) = pipeline(instance.capture.storage, joined.len() > 1) else { continue };
                 pass.set_pipeline(pipeline);
-                pass.set_bind_group(2, instance.active.map_or(&self.renderer.no_list, |active| &active.list), &[]);
+                pass.set_bind_group(2, self.renderer.list(instance.active), &[]);
                 for (at, part) in instance.capture.parts.iter().enumerate() {
                     pass.set_bind_group(0, group, &[index * INSTANCE_STRIDE]);
                     pass.set_bind_group(1, &part.geometry, &[]);
                     pass.set_bind_group(3, &part.color, &[]);
                     // More Gaussians may need fewer workgroups: each thread then has several.
-                    let own = batch.iter().map(|instance| groups(instance.capture.storage, instance.drawn(at)));
+                    let own = batch.iter().map(|instance| groups(instance.capture.storage, instance.drawn(at), count));
                     pass.dispatch_workgroups(own.max().unwrap_or_default(), 1, count);
                     // Instances that are drawn together have one part.
                     index += count;
@@ -79,7 +80,7 @@ impl Recording<'_> {
         for instance in self.instances {
             let Some(pipeline) = motion.pipeline(instance.capture.storage) else { continue };
             pass.set_pipeline(pipeline);
-            pass.set_bind_group(2, instance.active.map_or(&self.renderer.no_list, |active| &active.list), &[]);
+            pass.set_bind_group(2, self.renderer.list(instance.active), &[]);
             for (at, part) in instance.capture.parts.iter().enumerate() {
                 let offset = index * INSTANCE_STRIDE;
                 pass.set_bind_group(0, group, &[offset, offset]);

@@ -106,8 +106,8 @@ pub(in crate::renderer) trait ViewDesign: Any + Debug + Send + Sync {
     /// Returns the number of pairs of a frame with these counters, written or not.
     fn pair_count(&self, counters: &Counters) -> u32;
 
-    /// Processes the counters of an earlier frame.
-    fn note(&mut self, _counters: &Counters) {}
+    /// Processes the counters of an earlier frame, and the largest number of splats at any time of its captures.
+    fn note(&mut self, _counters: &Counters, _at_most: usize) {}
 
     /// Returns the number of entries of bins with room for as many splats as the fullest bin of an earlier frame.
     fn entries_needed(&self) -> u32 {

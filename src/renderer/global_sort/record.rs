@@ -23,7 +23,7 @@ impl SortBuffers {
         let passes = &frame.renderer.passes.global_sort;
         let (steps, blend) = (passes.steps()?, passes.blend(pixels, at_once)?);
         let pipeline = |storage, batched| passes.project(storage, batched);
-        frame.dispatch_parts(pass, pipeline, &self.project, |_, count| count.div_ceil(256));
+        frame.dispatch_parts(pass, pipeline, &self.project, |_, count, _| count.div_ceil(256));
         frame.mark(pass);
 
         // sort by depth: the first step drops the invisible splats and counts the visible splats; the later steps are sized

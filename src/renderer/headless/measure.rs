@@ -15,7 +15,7 @@ use crate::renderer::view::ViewRenderer;
 use crate::view::{Background, Counts, View};
 use std::time::{Duration, Instant};
 
-/// Frames per submit, each with its own buffers.
+/// Frames per submit, each with its own working buffers.
 const FRAMES_PER_SUBMIT: usize = 4;
 
 /// Time during which frames are drawn before the measurement: a GPU needs a fraction of a second to raise its clocks.

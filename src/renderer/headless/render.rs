@@ -256,10 +256,10 @@ impl Headless {
         [&layouts.captures[Storage::Sliced as usize][0], &layouts.active]
     }
 
-    /// Returns the bind group of the list of the Gaussians that were active in the frame [recorded](Self::record) last; without a filter,
-    /// of one that is not read.
+    /// Returns the bind group of the list of the Gaussians that were active in the frame [recorded](Self::record) last, which begins at
+    /// `first_listed` of its instance; without a filter, of one that is not read.
     pub fn recorded_list(&self) -> &wgpu::BindGroup {
-        self.active.as_ref().map_or(&self.renderer.no_list, |active| &active.list)
+        self.renderer.list(self.active.as_ref())
     }
 
     /// Returns the resources of the last frame on the GPU; `None` before the first frame, and in [`Design::TileBins`], which has other buffers.

@@ -70,9 +70,21 @@ pub(super) fn first_guess(picture: UVec2, side: u32, slots: u32) -> u32 {
 }
 
 /// Entries of all bins together, up to which each bin has room for as many splats as the fullest: [`EQUAL_ROOMS`], or
-/// [`EQUAL_ROOMS_OF_PAIR`] for each pair. Beyond it, bins are counted before they are filled, which takes two more dispatches.
+/// [`EQUAL_ROOMS_OF_PAIR`] for each pair. Beyond it, bins are counted before they are filled, which takes two more dispatches; see also
+/// [`counts_first`].
 const EQUAL_ROOMS: u32 = 1 << 23;
 const EQUAL_ROOMS_OF_PAIR: u32 = 4;
+
+/// Splats, the most at any time, from which on bins are counted before they are filled: in the first frames of a view, before the counts of a
+/// like frame are known, and in any frame. If a bin has no room, its tiles search all splats of the picture: with so many it takes seconds.
+const COUNTED_AT_FIRST: u32 = 1 << 18;
+const COUNTED: u32 = 1 << 21;
+
+/// Returns whether the bins of a frame of captures with at most so many splats are counted before they are filled. `is_known` is whether the
+/// counts of a like frame are known.
+pub(super) fn counts_first(splats: usize, is_known: bool) -> bool {
+    splats >= if is_known { COUNTED } else { COUNTED_AT_FIRST } as usize
+}
 
 /// Returns the largest number of entries of all bins together with room for the same number of splats, in a view of so many pairs.
 pub(super) fn equal_rooms(pairs: u32) -> u32 {
@@ -109,6 +121,12 @@ mod tests {
         ] {
             assert_eq!(bin_side(UVec2::splat(size), gaussians), side, "{gaussians} Gaussians, {size} pixels");
         }
+    }
+
+    #[test]
+    fn crowds_are_counted_first_until_their_bins_are_known() {
+        let crowds = [100_000, 400_000, 3_000_000].map(|splats| [false, true].map(|known| counts_first(splats, known)));
+        assert_eq!(crowds, [[false, false], [true, false], [true, true]]);
     }
 
     #[test]

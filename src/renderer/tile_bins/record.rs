@@ -25,6 +25,8 @@ fn colors_of_group(storage: Storage) -> u32 {
 const MOST_GROUPS: u32 = 8192;
 /// The number of workgroups of `colors` where few splats were visible in an earlier frame. A workgroup that finds no splat takes time, too.
 const LEAST_GROUPS: u32 = 1024;
+/// The same for each of several instances that are drawn by one dispatch: one of them may have most of the splats.
+const LEAST_OF_INSTANCE: u32 = 256;
 
 impl BinBuffers {
     /// Records the passes of a frame; `None` where a pass has not been compiled.
@@ -47,10 +49,11 @@ impl BinBuffers {
         // colors
         if frame.has_colors {
             let pipeline = |storage, batched| passes.colors(storage, batched);
-            let groups = |storage, count: u32| {
+            let groups = |storage, count: u32, instances: u32| {
                 let groups = |splats: u32| splats.div_ceil(colors_of_group(storage));
                 let most = state.visible.map_or(MOST_GROUPS, |count| groups(count).clamp(LEAST_GROUPS, MOST_GROUPS));
-                groups(count).min(most)
+                // Of many instances few have more than twice the mean of visible splats; their workgroups loop for longer.
+                groups(count).min((2 * most).div_ceil(instances).max(LEAST_OF_INSTANCE)).min(most)
             };
             frame.dispatch_parts(pass, pipeline, &self.colors[parity], groups);
         }
@@ -77,7 +80,7 @@ impl BinBuffers {
 
         // project_bin
         let pipeline = |storage, batched| passes.project_bin(storage, batched, state.variant);
-        let groups = |_, count: u32| count.div_ceil(256 * per_thread(count));
+        let groups = |_, count: u32, _| count.div_ceil(256 * per_thread(count));
         frame.dispatch_parts(pass, pipeline, &self.project_bin[parity], groups);
 
         // place_bins, fill_bins

@@ -29,6 +29,8 @@ pub(in crate::renderer) struct BinState {
     pub fullest: u32,
     /// Number of visible splats of an earlier frame, if they have been counted.
     pub visible: Option<u32>,
+    /// The largest number of splats at any time of the captures of the newest frame of which some were visible.
+    counted_of: usize,
     /// Number of bins that the frame recorded last has cleared for the next frame.
     pub cleared: u32,
     /// The wanted capacity.
@@ -41,7 +43,7 @@ impl BinState {
         let made = if self.variant.counted { 0 } else { entries };
         let BinRoom { wanted, is_known, .. } = self.room;
         let room = BinRoom { wanted: wanted.max(made), is_known, ..BinRoom::default() };
-        Self { room, ..Self::default() }
+        Self { room, counted_of: self.counted_of, ..Self::default() }
     }
 
     /// Returns 1 if the counters of odd frames are used, otherwise 0.
@@ -69,6 +71,12 @@ impl BinState {
         if self.variant.counted { 0 } else { sizes.entries / self.count() }
     }
 
+    /// Returns whether the counts of an earlier frame tell something of a frame of at most so many splats: those of few splats say nothing of
+    /// many.
+    pub(super) fn is_known(&self, at_most: usize) -> bool {
+        at_most <= 2 * self.counted_of
+    }
+
     /// Returns whether bins must be counted before they are filled, because room for the same number of splats in each would be more than
     /// `most` entries. `guess` is the number of these entries before splats have been counted.
     pub(super) fn must_count(&self, guess: u32, most: u32) -> bool {
@@ -92,8 +100,11 @@ impl BinState {
         too_many || counters.pairs > sizes.pairs
     }
 
-    /// Processes the counters of a frame that was drawn with these sizes.
-    pub(super) fn note(&mut self, sizes: &Sizes, counters: &Counters) {
+    /// Processes the counters of a frame that was drawn with these sizes, of captures with at most so many splats.
+    pub(super) fn note(&mut self, sizes: &Sizes, counters: &Counters, at_most: usize) {
+        if counters.visible > 0 {
+            self.counted_of = at_most;
+        }
         (self.fullest, self.visible) = (counters.pairs_wanted, Some(counters.visible));
         let capacity = if self.variant.counted { 0 } else { sizes.entries };
         self.room.note(self.fullest.saturating_mul(self.count()), capacity);
@@ -149,7 +160,7 @@ mod tests {
         assert!(!bins.must_count(guess, 5000), "the guess fits");
         let counters = Counters { visible: 300, pairs: 700, pairs_wanted: 100, padding: 0 };
         let sizes = Sizes { pairs: 700, entries: 5000, ordered: 700, ..Sizes::default() };
-        bins.note(&sizes, &counters);
+        bins.note(&sizes, &counters, 900);
         let needed = bins.count() * 100;
         assert!(bins.must_count(guess, needed), "the fullest bin is known, and needs a reserve of one half");
         assert!(!bins.must_count(guess, needed + needed / 2), "equal rooms with their reserve fit");
@@ -161,6 +172,18 @@ mod tests {
         assert!(!bins.lacks_room(&sizes, &counters), "all entries have room");
         let few = Sizes { ordered: 699, ..sizes };
         assert!(bins.lacks_room(&few, &counters), "there may be as many entries as pairs");
+    }
+
+    #[test]
+    fn counts_of_few_splats_say_nothing_of_many() {
+        let mut bins = BinState { picture: UVec2::new(640, 480), side: 4, ..BinState::default() };
+        assert!(!bins.is_known(1), "no frame has been counted");
+        let none = Counters { visible: 0, pairs: 0, pairs_wanted: 0, padding: 0 };
+        bins.note(&Sizes::default(), &none, 4_000_000);
+        assert!(!bins.is_known(4_000_000), "nothing was visible");
+        bins.note(&Sizes::default(), &Counters { visible: 500, ..none }, 1000);
+        assert_eq!([1000, 2000, 2001].map(|splats| bins.is_known(splats)), [true, true, false]);
+        assert!(bins.another(0).is_known(2000), "a view that begins as this one");
     }
 
     #[test]

@@ -126,15 +126,15 @@ impl BinVariant {
     }
 
     /// Returns the other variants that draw the same picture, perhaps not as fast: with lists of other lengths, counters for any number of bins,
-    /// batches of another size, bins that are counted first or not.
+    /// batches of another size, bins that are counted first. Bins that are to be counted are: without, they may have no room.
     pub(in crate::renderer) fn substitutes(self) -> impl Iterator<Item = Self> {
         let bins = if self.few_bins { &[true, false][..] } else { &[false] };
         let lists = [self.lists].into_iter().chain(Lists::ALL);
         let batches = [self.large_batches, !self.large_batches];
-        let counted = [self.counted, !self.counted];
+        let counted: &[bool] = if self.counted { &[true] } else { &[false, true] };
         lists
             .flat_map(move |lists| batches.map(|large_batches| Self { lists, large_batches, ..self }))
-            .flat_map(move |variant| counted.map(|counted| Self { counted, ..variant }))
+            .flat_map(move |variant| counted.iter().map(move |&counted| Self { counted, ..variant }))
             .flat_map(move |variant| bins.iter().map(move |&few_bins| Self { few_bins, ..variant }))
     }
 

@@ -3,7 +3,7 @@
 //! In: frames that are prepared and recorded, counters of earlier frames. Out: [`TileBins`]: the state of the bins, the variants of the passes,
 //! the buffers.
 
-use super::bins::{MAX_SLOTS, bin_side, equal_rooms, few_bins, first_guess, large_batches, per_thread};
+use super::bins::{MAX_SLOTS, bin_side, counts_first, equal_rooms, few_bins, first_guess, large_batches, per_thread};
 use super::buffers::BinBuffers;
 use super::loops;
 use super::scratch::ScratchBuffers;
@@ -59,7 +59,8 @@ impl ViewDesign for TileBins {
         let guess = |picture| first_guess(picture, side, frame.at_most as u32);
         let wanted = BinVariant {
             few_bins: few_bins(picture, side, gaussians),
-            counted: self.state.must_count(guess(picture), equal_rooms),
+            counted: counts_first(frame.at_most, self.state.is_known(frame.at_most))
+                || self.state.must_count(guess(picture), equal_rooms),
             lists: Lists::suiting(&limits, self.state.fullest),
             blending,
             precision: frame.pixels.precision,
@@ -157,9 +158,9 @@ impl ViewDesign for TileBins {
         counters.pairs
     }
 
-    fn note(&mut self, counters: &Counters) {
+    fn note(&mut self, counters: &Counters, at_most: usize) {
         if let Some(buffers) = &self.buffers {
-            self.state.note(&buffers.sizes, counters);
+            self.state.note(&buffers.sizes, counters, at_most);
         }
     }
 

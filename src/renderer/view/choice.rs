@@ -9,8 +9,7 @@ use crate::renderer::pipelines::Renderer;
 use crate::renderer::tile_bins::{self, MAX_SLOTS};
 
 impl ViewRenderer {
-    /// Sets the design with which the view is drawn from the next [`prepare`](Self::prepare) on. Default: [`Design::Auto`]. A change ends the
-    /// [measurement](Self::measure) of GPU time.
+    /// Sets the design with which the view is drawn from the next [`prepare`](Self::prepare) on. Default: [`Design::Auto`].
     pub fn set_design(&mut self, renderer: &Renderer, design: Design) {
         if self.wanted == design {
             return;
@@ -19,7 +18,6 @@ impl ViewRenderer {
         self.crowded = false;
         let design = renderer.resolve(design);
         if self.design() != design {
-            self.timing = None;
             self.begin_design(design);
         }
     }

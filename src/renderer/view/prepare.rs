@@ -62,6 +62,7 @@ impl ViewRenderer {
         self.poll();
         // The maximum over time, so that another segment of a filter does not change the buffers.
         let at_most: usize = instances.iter().map(|instance| most_drawn(instance.capture, instance.active)).sum();
+        self.at_most = at_most;
         self.choose_design(device, renderer, at_most);
         let blending = parameters.blending();
         let frame = Preparation {
@@ -154,11 +155,10 @@ impl ViewRenderer {
                 motion.update(frame, made);
             }
         }
-        // Frames with motions have more timed passes. A frame timed as a whole has none.
+        // Designs have other passes, and frames with motions have more. A frame timed as a whole has none.
         let stale = |timer: &PassTimer| !timer.passes().is_empty() && timer.passes() != self.timed_passes();
         if self.timing.as_ref().is_some_and(|(timer, _)| stale(timer)) {
-            self.measure(frame.device, frame.queue, frame.renderer, false);
-            self.measure(frame.device, frame.queue, frame.renderer, true);
+            self.begin_timing(frame.renderer.allocator(frame.device), frame.queue);
         }
         Ok(())
     }
@@ -197,7 +197,7 @@ impl ViewRenderer {
             let counters: Counters = bytemuck::pod_read_unaligned(&counters);
             self.statistics.visible = counters.visible;
             self.statistics.pairs = self.design.pair_count(&counters);
-            self.make_room(&counters);
+            self.make_room_for(&counters, self.copied_at_most);
         }
         if let Some((timer, readback)) = &mut self.timing
             && let Some(timestamps) = readback.poll()

@@ -46,7 +46,7 @@ impl ViewRenderer {
         drop(pass);
         if let Some((counters, offset)) = self.design.counters().filter(|_| self.readback.is_idle()) {
             self.readback.copy(encoder, counters, offset);
-            self.copied_from = self.generation;
+            (self.copied_from, self.copied_at_most) = (self.generation, self.at_most);
         }
     }
 }

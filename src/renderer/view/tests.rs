@@ -337,5 +337,7 @@ fn substitutes_draw_the_same_picture() {
         assert!(substitutes.iter().all(same), "the surfaces and targets are those of the view: {substitutes:?}");
         let few = substitutes.iter().any(|other| other.few_bins);
         assert_eq!(few, few_bins, "counters for few bins have no room for many: {substitutes:?}");
+        let counted = BinVariant { counted: true, ..wanted };
+        assert!(counted.substitutes().all(|other| other.counted), "bins that are not counted may have no room");
     }
 }

@@ -20,8 +20,9 @@ impl ViewRenderer {
             let ViewParameters { blend_space, debug, .. } = *parameters;
             let capture = instance.capture;
             let seen = capture.settings.in_view(&instance.view, &instance.appearance, blend_space, debug);
-            let listed = u32::from(instance.active.is_some());
-            let mut own = InstanceUniforms { listed, middle: capture.middle(seen.camera_z), ..seen };
+            let (listed, first_listed) = instance.active.map_or((0, 0), |active| (1, active.first()));
+            let middle = capture.middle(seen.camera_z);
+            let mut own = InstanceUniforms { listed, first_listed, middle, ..seen };
             for part in 0..capture.parts.len() {
                 own.first_slot = slot;
                 own.count = instance.drawn(part);

@@ -5,6 +5,7 @@
 use super::motion::MotionResources;
 use super::readback::Readback;
 use super::resources::Resources;
+use crate::renderer::device::memory::Allocator;
 use crate::renderer::frame::Design;
 use crate::renderer::frame::ViewDesign;
 use crate::renderer::global_sort::{FinishedFrame, GlobalSort};
@@ -12,7 +13,7 @@ use crate::renderer::layout::{self, Counters};
 use crate::renderer::pipelines::Renderer;
 use crate::renderer::statistics::ViewStatistics;
 use crate::renderer::tile_bins::TileBins;
-use crate::renderer::timing::PassTimer;
+use crate::renderer::timing::{Measured, PassTimer};
 use glam::UVec2;
 use std::any::Any;
 use wgpu::{BufferUsages, TextureFormat};
@@ -43,6 +44,9 @@ pub struct ViewRenderer {
     /// Number of releases of the buffers, and the value that it had when the counters that are read back were copied.
     pub(super) generation: u32,
     pub(super) copied_from: u32,
+    /// The largest number of splats at any time, of the frame prepared last and of that whose counters are read back.
+    pub(super) at_most: usize,
+    pub(super) copied_at_most: usize,
     /// Whether the frame prepared last has depths, and whether colors of splats are computed.
     pub(super) has_depths: bool,
     pub(super) has_colors: bool,
@@ -58,6 +62,8 @@ pub struct ViewRenderer {
     pub(super) no_environment: wgpu::Buffer,
     pub(super) readback: Readback,
     pub(super) statistics: ViewStatistics,
+    /// How GPU time is measured.
+    measured: Measured,
     /// Timestamps, if GPU time is measured and the device supports timestamps.
     pub(super) timing: Option<(PassTimer, Readback)>,
     /// Resources whose sizes depend on the view or the captures.
@@ -81,6 +87,8 @@ impl ViewRenderer {
             crowded: false,
             generation: 0,
             copied_from: 0,
+            at_most: 0,
+            copied_at_most: 0,
             pairs_wanted: 0,
             short_of_room: false,
             oversized_frames: 0,
@@ -90,6 +98,7 @@ impl ViewRenderer {
             no_environment: allocator.buffer("gs4d no environment", 16, BufferUsages::STORAGE),
             readback: Readback::new(allocator, "gs4d counter readback", counters),
             statistics: ViewStatistics::default(),
+            measured: Measured::Nothing,
             timing: None,
             has_depths: true,
             has_colors: true,
@@ -120,20 +129,28 @@ impl ViewRenderer {
         self.motion.as_ref().map(|motion| &motion.view)
     }
 
-    /// Sets whether GPU time is measured from the next frame on, pass by pass, or for the frame as a whole if the device has no timestamps
-    /// inside passes. Results arrive in [`statistics`](Self::statistics) some frames later; there are none if the device has no timestamps.
-    pub fn measure(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, renderer: &Renderer, on: bool) {
-        if !on {
-            self.timing = None;
-            self.statistics.passes.clear();
-        } else if self.timing.is_none() {
-            let allocator = renderer.allocator(device);
-            let by_pass = PassTimer::new(allocator, queue, self.timed_passes());
-            self.timing = by_pass.or_else(|| PassTimer::new(allocator, queue, &[])).map(|timer| {
-                let size = timer.resolved().size();
-                (timer, Readback::new(allocator, "gs4d timestamp readback", size))
-            });
+    /// Sets how GPU time is measured from the next frame on. Results arrive in [`statistics`](Self::statistics) some frames later; there are
+    /// none if the device has no timestamps.
+    pub fn measure(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, renderer: &Renderer, measured: Measured) {
+        if self.measured != measured {
+            self.measured = measured;
+            self.begin_timing(renderer.allocator(device), queue);
         }
+    }
+
+    /// Creates the timestamps of the frames from the next one on, or releases them.
+    pub(super) fn begin_timing(&mut self, allocator: Allocator<'_>, queue: &wgpu::Queue) {
+        self.statistics.passes.clear();
+        let frame = || PassTimer::new(allocator, queue, &[]);
+        let timer = match self.measured {
+            Measured::Nothing => None,
+            Measured::Frame => frame(),
+            Measured::Passes => PassTimer::new(allocator, queue, self.timed_passes()).or_else(frame),
+        };
+        self.timing = timer.map(|timer| {
+            let size = timer.resolved().size();
+            (timer, Readback::new(allocator, "gs4d timestamp readback", size))
+        });
     }
 
     /// Makes tile bins leave out the colors of splats, for clients that read depths alone. Transmittance and depths do not change;
@@ -183,8 +200,9 @@ impl ViewRenderer {
     }
 
     /// Makes the next [`prepare`](Self::prepare) increase the capacities of pairs and bins to 1.5 times these counters if they exceed three
-    /// quarters of the capacities, within the limits of the device.
-    pub(crate) fn make_room(&mut self, counters: &Counters) {
+    /// quarters of the capacities, within the limits of the device. `at_most` is the largest number of splats at any time of the captures of
+    /// that frame.
+    pub(super) fn make_room_for(&mut self, counters: &Counters, at_most: usize) {
         // Counts from before the release of the buffers are ignored.
         let Some(made) = &self.resources else { return };
         // The buffers grow before they are full, since counts arrive some frames late.
@@ -192,7 +210,12 @@ impl ViewRenderer {
         if pairs > made.sizes.pairs / 4 * 3 {
             self.pairs_wanted = pairs.saturating_add(pairs / 2);
         }
-        self.design.note(counters);
+        self.design.note(counters, at_most);
+    }
+
+    /// Makes room as [`make_room_for`](Self::make_room_for), after the frame prepared last.
+    pub(crate) fn make_room(&mut self, counters: &Counters) {
+        self.make_room_for(counters, self.at_most);
     }
 
     /// Makes the first [`prepare`](Self::prepare) allocate the capacities of another view, or the larger capacities that the other view's next

@@ -57,13 +57,13 @@ pub struct CaptureBudget {
     /// kept. Default: `None`, no limit.
     pub frame_time: Option<Duration>,
     /// The smallest share of the Gaussians of a capture, those of all times, that is drawn whole, from 0 to 1, even if
-    /// the time is exceeded; at least one of 4,096. Default: 1/16.
+    /// the time is exceeded; at least one of 4,096. Default: 1/64.
     pub least_share: f32,
 }
 
 impl Default for CaptureBudget {
     fn default() -> Self {
-        Self { gpu_time: None, frame_time: None, least_share: 1.0 / 16.0 }
+        Self { gpu_time: None, frame_time: None, least_share: 1.0 / 64.0 }
     }
 }
 

@@ -10,7 +10,7 @@ use crate::plugin::render::targets::bindings::{CachedGroup, IdleFrames};
 use crate::plugin::render::targets::composite::CompositeBindings;
 use crate::plugin::render::targets::write_depth::WriteDepthBindings;
 use crate::renderer::device::memory::Caught;
-use crate::renderer::{Design, Instance, Renderer, ViewRenderer};
+use crate::renderer::{Instance, Renderer, ViewRenderer};
 use crate::view::{Appearance, View};
 use bevy::asset::AssetId;
 use bevy::ecs::entity::Entity;
@@ -19,7 +19,7 @@ use bevy::ecs::system::Res;
 use bevy::platform::collections::HashMap;
 use bevy::render::render_asset::RenderAssets;
 use bevy::render::render_resource::CachedRenderPipelineId;
-use bevy::render::renderer::{RenderDevice, RenderQueue};
+use bevy::render::renderer::RenderDevice;
 use bevy::render::sync_world::MainEntity;
 
 /// State of every camera that may see captures, by its entity in the render world.
@@ -56,8 +56,6 @@ pub(crate) struct CaptureView {
     pub(crate) is_shaded: bool,
     /// The changed picture, which the composite uses instead of the renderer's color.
     pub(crate) shaded: Option<wgpu::TextureView>,
-    /// Whether GPU times are measured.
-    measured: bool,
     idle: IdleFrames,
     /// The captures that the camera sees this frame; nothing is drawn while this is empty.
     pub(crate) drawn: Vec<Drawn>,
@@ -84,8 +82,8 @@ pub(crate) struct Drawn {
     pub(crate) level: usize,
 }
 
-/// Moves the copies of each capture at one level next to the first copy, so that one dispatch draws all copies without
-/// a list of active Gaussians. The order is otherwise kept, since it decides between splats of the same depth.
+/// Moves the copies of each capture at one level next to the first copy, so that one dispatch draws copies whose lists of
+/// active Gaussians are in one buffer, or that have none. The order is otherwise kept, since it decides between splats of the same depth.
 pub(crate) fn group_copies(drawn: &mut [Drawn]) {
     // Two captures are always adjacent.
     if drawn.len() < 3 {
@@ -131,7 +129,6 @@ impl CaptureView {
             pose: None,
             is_shaded: false,
             shaded: None,
-            measured: false,
             idle: IdleFrames::default(),
             drawn: Vec::new(),
             shown: Vec::new(),
@@ -210,27 +207,6 @@ impl CaptureView {
         if self.left_out == 0 {
             self.shown.clear();
             self.shown.extend(self.drawn.iter().map(|one| one.entity));
-        }
-    }
-
-    /// Sets the design of the renderer. A change stops measuring.
-    pub(in crate::plugin::render) fn set_design(&mut self, renderer: &Renderer, design: Design) {
-        let before = self.renderer.design();
-        self.renderer.set_design(renderer, design);
-        self.measured &= self.renderer.design() == before;
-    }
-
-    /// Starts or stops measuring GPU times.
-    pub(in crate::plugin::render) fn measure(
-        &mut self,
-        on: bool,
-        device: &RenderDevice,
-        queue: &RenderQueue,
-        renderer: &Renderer,
-    ) {
-        if self.measured != on {
-            self.measured = on;
-            self.renderer.measure(device.wgpu_device(), queue, renderer, on);
         }
     }
 }

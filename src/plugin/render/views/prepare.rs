@@ -29,7 +29,7 @@ use crate::plugin::render::targets::depth_readers::DepthReaders;
 use crate::plugin::render::targets::write_depth::{WriteDepthKey, WriteDepthPipeline, WrittenDepth};
 use crate::plugin::render::targets::write_motion::{WriteMotionKey, WriteMotionPipeline};
 use crate::renderer::device::memory::{catch, catch_known};
-use crate::renderer::{ColorPrecision, GpuError, OpaqueDepth, ViewParameters};
+use crate::renderer::{ColorPrecision, GpuError, Measured, OpaqueDepth, ViewParameters};
 use crate::view::{Appearance, Background, DebugView, View};
 use bevy::camera::{Camera3d, CompositingSpace, MainPassResolutionOverride};
 use bevy::core_pipeline::prepass::ViewPrepassTextures;
@@ -191,7 +191,7 @@ pub(in crate::plugin::render) fn prepare_views(
         renderer: &renderer,
         scene: &scene,
         pipelines: &mut pipelines,
-        measure: statistics.is_measuring(),
+        measured: statistics.measured(),
     };
     for camera in &cameras {
         let entity = camera.0;
@@ -231,7 +231,7 @@ struct Preparation<'a, 's, 'p> {
     renderer: &'a CaptureRenderer,
     scene: &'a Scene<'s>,
     pipelines: &'a mut Pipelines<'p>,
-    measure: bool,
+    measured: Measured,
 }
 
 impl Preparation<'_, '_, '_> {
@@ -352,12 +352,12 @@ impl Preparation<'_, '_, '_> {
         camera: &CameraItem<'_>,
         [CameraPose { lens, .. }, previous_pose]: [CameraPose; 2],
     ) -> Result<(), GpuError> {
-        let Self { device, queue, renderer, scene, measure, .. } = *self;
+        let Self { device, queue, renderer, scene, measured, .. } = *self;
         let &(_, view, _, depth, &msaa, _, _, prepass) = camera;
         let main = view.retained_view_entity.main_entity;
         let (settings, size) = (self.settings(view), size(camera));
-        state.set_design(&renderer.0, settings.design);
-        state.measure(measure, device, queue, &renderer.0);
+        state.renderer.set_design(&renderer.0, settings.design);
+        state.renderer.measure(device.wgpu_device(), queue, &renderer.0, measured);
         // Debug views do not show light, so they are not shaded.
         state.is_shaded = settings.debug == DebugView::Color && scene.shade.want(main, &state.drawn);
         let viewport = UVec4::new(view.viewport.x, view.viewport.y, size.x, size.y);
