@@ -52,11 +52,6 @@ impl ActiveList {
         Some(Self { capture: capture.id, prepared, recorded: false, listing, uniforms, pages, activate, place })
     }
 
-    /// Returns the bind group with the list, which the passes of a frame read.
-    pub(super) fn group(&self) -> &wgpu::BindGroup {
-        self.place.group()
-    }
-
     /// Returns the index of the first entry of the list in its bind group.
     pub(super) fn first(&self) -> u32 {
         self.place.first()
@@ -139,6 +134,13 @@ impl ActiveList {
             (None, Some(([segment, _], _))) => filter.count(part, segment, prefix),
             (None, None) => 0,
         }
+    }
+}
+
+impl Renderer {
+    /// Returns the bind group of a list; without a list, of one that is not read.
+    pub(super) fn list<'a>(&'a self, active: Option<&'a ActiveList>) -> &'a wgpu::BindGroup {
+        active.map_or(&self.no_list, |active| active.place.group())
     }
 }
 

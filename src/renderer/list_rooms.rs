@@ -97,38 +97,3 @@ impl Drop for ListPlace {
         self.room.free.lock().unwrap_or_else(PoisonError::into_inner).push(self.index);
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::renderer::device::GpuContext;
-    use crate::renderer::shaders::ShaderChecks;
-    use crate::renderer::view::tests::skip::skip;
-
-    #[test]
-    fn lists_are_beside_each_other_and_leave_their_places() {
-        let GpuContext { device, .. } = match GpuContext::headless(None) {
-            Ok(context) => context,
-            Err(error) => return skip(error),
-        };
-        let renderer = Renderer::new(&device, ShaderChecks::On).expect("the passes compile");
-        let rooms = ListRooms::default();
-        let take = |length| rooms.place(&device, &renderer, length);
-        let [alone, second, third] = [(); 3].map(|()| take(20_000));
-        assert!(!alone.is_beside(&second) && second.is_beside(&third), "the first long list has a buffer of its own");
-        assert_eq!([alone.first(), second.first(), third.first()], [0, 0, 20_000], "places follow each other");
-        assert_eq!(second.buffer().size(), 64 * 80_000, "room for the lists of one dispatch");
-        drop(second);
-        let (next, longer) = (take(20_000), take(20_001));
-        assert_eq!((next.first(), next.is_beside(&third)), (0, true), "the place is free again");
-        assert!(!longer.is_beside(&third), "lists of another length are in another buffer");
-        let others: Vec<ListPlace> = (0..63).map(|_| take(20_000)).collect();
-        let first: Vec<u32> = others.iter().filter(|list| list.is_beside(&third)).map(ListPlace::first).collect();
-        let expected: Vec<u32> = (2..64).map(|index| 20_000 * index).collect();
-        assert_eq!(first, expected, "62 more lists in the buffer, and one in the next");
-        let large = [(); 2].map(|()| take(1 << 20));
-        assert_eq!(large[1].buffer().size(), 8 << 20, "room for two lists of 4 MiB");
-        let short = [(); 2].map(|()| take(0));
-        assert!(short[0].is_beside(&short[1]), "short lists are beside each other from the first on");
-    }
-}

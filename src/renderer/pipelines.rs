@@ -2,7 +2,6 @@
 //!
 //! In: a device. Out: the compiled passes, and the bind group layouts of the passes, for the buffers of views and captures.
 
-use super::active::ActiveList;
 use super::capture::SharedCodebooks;
 use super::compiling::Compiling;
 use super::device::GpuError;
@@ -33,7 +32,7 @@ pub struct Renderer {
     /// loops of a thread may end early.
     pub(super) is_software: bool,
     /// Bound instead of a list of active Gaussians if all Gaussians are drawn.
-    no_list: wgpu::BindGroup,
+    pub(super) no_list: wgpu::BindGroup,
     /// The working buffers that views share.
     pub(super) scratch: Scratch,
     /// The codebooks that captures share.
@@ -68,11 +67,6 @@ impl Renderer {
             codebooks: SharedCodebooks::default(),
             work,
         })
-    }
-
-    /// Returns the bind group of a list; without a list, of one that is not read.
-    pub(super) fn list<'a>(&'a self, active: Option<&'a ActiveList>) -> &'a wgpu::BindGroup {
-        active.map_or(&self.no_list, ActiveList::group)
     }
 
     /// Returns the renderer with these counters instead of its own: for a renderer that replaces another after a lost device.

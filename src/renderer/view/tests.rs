@@ -1,7 +1,7 @@
-//! Counters and stamps of tile bins from frame to frame.
+//! Counters and stamps of tile bins from frame to frame; the places of lists.
 //!
 //! In: synthetic scenes, frames with and without Gaussians, counters that the tests write. Out: proof that a frame depends on no counter and no
-//! splat of an earlier frame. Skipped where there is no GPU.
+//! splat of an earlier frame, and that lists have places of their own. Skipped where there is no GPU.
 
 use super::ViewRenderer;
 use crate::gaussian::{Gaussian, Harmonics};
@@ -11,6 +11,7 @@ use crate::renderer::frame::Blending;
 use crate::renderer::frame::Design;
 use crate::renderer::frame::{Instance, OpaqueDepth, ViewParameters};
 use crate::renderer::layout::Counters;
+use crate::renderer::list_rooms::{ListPlace, ListRooms};
 use crate::renderer::pipelines::Renderer;
 use crate::renderer::shaders::ShaderChecks;
 use crate::renderer::tile_bins::{BinVariant, Lists, MAX_SLOTS, TileBins};
@@ -340,4 +341,28 @@ fn substitutes_draw_the_same_picture() {
         let counted = BinVariant { counted: true, ..wanted };
         assert!(counted.substitutes().all(|other| other.counted), "bins that are not counted may have no room");
     }
+}
+
+#[test]
+fn lists_are_beside_each_other_and_leave_their_places() {
+    let Some(gpu) = gpu() else { return };
+    let device = &gpu.context.device;
+    let rooms = ListRooms::default();
+    let take = |length| rooms.place(device, &gpu.renderer, length);
+    let [alone, second, third] = [(); 3].map(|()| take(20_000));
+    assert!(!alone.is_beside(&second) && second.is_beside(&third), "the first long list has a buffer of its own");
+    assert_eq!([alone.first(), second.first(), third.first()], [0, 0, 20_000], "places follow each other");
+    assert_eq!(second.buffer().size(), 64 * 80_000, "room for the lists of one dispatch");
+    drop(second);
+    let (next, longer) = (take(20_000), take(20_001));
+    assert_eq!((next.first(), next.is_beside(&third)), (0, true), "the place is free again");
+    assert!(!longer.is_beside(&third), "lists of another length are in another buffer");
+    let others: Vec<ListPlace> = (0..63).map(|_| take(20_000)).collect();
+    let first: Vec<u32> = others.iter().filter(|list| list.is_beside(&third)).map(ListPlace::first).collect();
+    let expected: Vec<u32> = (2..64).map(|index| 20_000 * index).collect();
+    assert_eq!(first, expected, "62 more lists in the buffer, and one in the next");
+    let large = [(); 2].map(|()| take(1 << 20));
+    assert_eq!(large[1].buffer().size(), 8 << 20, "room for two lists of 4 MiB");
+    let short = [(); 2].map(|()| take(0));
+    assert!(short[0].is_beside(&short[1]), "short lists are beside each other from the first on");
 }
