@@ -37,7 +37,7 @@ pub(crate) struct SocketVerb {
     /// The name of the socket.
     #[arg(long, value_name = "NAME", required_unless_present_any = ["list", "points"])]
     name: Option<String>,
-    /// The position, capture space: on the part to follow.
+    /// The position, capture space: on or in the part to follow.
     #[arg(long, value_name = "X,Y,Z", value_parser = values::point, allow_hyphen_values = true)]
     #[arg(required_unless_present_any = ["list", "remove", "points"])]
     at: Option<[f32; 3]>,

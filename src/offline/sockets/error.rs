@@ -22,7 +22,7 @@ pub enum SocketError {
         /// The last time of the capture, timestamp units.
         last: f32,
     },
-    /// No Gaussian, or too few that agree, is visible at the point.
+    /// The point is in the air, or too few Gaussians that agree are visible near it.
     #[error(
         "nothing that can be followed is visible within {distance} units of the point at the time {time}: place it on \
          what it is to follow, at a time at which that is visible"

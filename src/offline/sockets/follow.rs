@@ -19,8 +19,11 @@ const FEWEST: usize = 4;
 const SUPPORT: f64 = 3.0;
 /// Smallest and largest distance within which neighbors are, as parts of the size of the capture.
 const REACH: [f64; 2] = [0.02, 0.1];
-/// Largest distance from a point to what it is placed on, as a part of the size of the capture.
+/// Largest distance from a point to what it is placed on, as a part of the size of the capture, unless that is around it.
 const NEAREST: f64 = 0.01;
+/// Length of the mean direction to the neighbors from which on they are on one side of a point: in the bundled island
+/// 0.9 and more for points in the air, 0.8 and less on surfaces.
+const ONE_SIDE: f64 = 0.85;
 /// Factor by which neighbors may be farther away than at the start, where the capture becomes thin.
 const THINNER: f64 = 2.0;
 /// Largest estimate of the error, as a part of the size of the capture: beyond, the point is lost.
@@ -37,7 +40,7 @@ const STEPS: f64 = 256.0;
 pub struct Placement {
     /// The name of the socket.
     pub name: String,
-    /// The position, capture space: on the part that is followed, within 1 % of the capture's size.
+    /// The position, capture space: on or in the part that is followed.
     pub position: [f32; 3],
     /// The time at which the position is meant, timestamp units.
     pub time: f32,
@@ -158,16 +161,17 @@ impl<'a> Follower<'a> {
     /// Returns the follower of a point.
     ///
     /// # Errors
-    /// It is on no Gaussian, or too few that agree are near it.
+    /// It is in the air, or too few that agree are near it.
     fn placed(cloud: &'a Cloud, start: &SocketSample) -> Result<Self, SocketError> {
         let [least, most] = REACH.map(|part| part * cloud.size);
         let (place, time) = (Vec3::from(start.position).as_dvec3(), f64::from(start.time));
-        let nearest = NEAREST * cloud.size;
-        if !cloud.touches(place, time, nearest) {
-            return Err(SocketError::NothingThere { distance: nearest as f32, time: start.time });
-        }
         let Near { neighbors, radius } = cloud.near(place, time, most);
         let sum: f64 = neighbors.iter().map(|neighbor| neighbor.weight).sum();
+        let towards = neighbors.iter().map(|one| (one.at(time) - place).normalize_or_zero() * one.weight);
+        let (nearest, is_beside) = (NEAREST * cloud.size, towards.sum::<DVec3>().length() > ONE_SIDE * sum);
+        if is_beside && !cloud.touches(place, time, nearest) {
+            return Err(SocketError::NothingThere { distance: nearest as f32, time: start.time });
+        }
         let squares = neighbors.iter().map(|neighbor| neighbor.weight * neighbor.at(time).distance_squared(place));
         let around = (squares.sum::<f64>() / sum).sqrt().max(LOOK * cloud.size);
         let look = Look::of(cloud.colors(place, time, around), around);
