@@ -52,12 +52,12 @@ impl ActiveList {
         Some(Self { capture: capture.id, prepared, recorded: false, listing, uniforms, pages, activate, place })
     }
 
-    /// Returns the index of the first entry of the list in its bind group.
+    /// Returns the index of the first entry of the list in its buffer, which may have other lists, too.
     pub(super) fn first(&self) -> u32 {
         self.place.first()
     }
 
-    /// Returns whether one bind group has this list and another one.
+    /// Returns whether this list and another one are in one buffer.
     pub(super) fn is_beside(&self, other: &Self) -> bool {
         self.place.is_beside(&other.place)
     }

@@ -51,8 +51,7 @@ impl ListRooms {
 }
 
 impl ListRoom {
-    /// Creates a buffer whose first place is taken. `others` is the number of other buffers of
-    /// such lists.
+    /// Creates a buffer whose first place is taken. `others` is the number of other buffers of such lists.
     fn new(device: &wgpu::Device, renderer: &Renderer, length: u32, others: usize) -> Self {
         let allocator = renderer.allocator(device);
         let bytes = u64::from(length.max(1)) * 4;
@@ -63,7 +62,7 @@ impl ListRoom {
         Self { buffer, group, length, free: Mutex::new((1..places).rev().collect()) }
     }
 
-    /// Returns the first free place.
+    /// Takes a free place, if there is one.
     fn place(self: &Arc<Self>) -> Option<ListPlace> {
         let index = self.free.lock().unwrap_or_else(PoisonError::into_inner).pop()?;
         Some(ListPlace { room: Arc::clone(self), index })
