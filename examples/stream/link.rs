@@ -122,8 +122,8 @@ impl Link {
         is_lost
     }
 
-    /// Returns when the last byte arrives of a request that was sent at `asked`: requests wait for their first byte
-    /// side by side, and their bytes follow one another.
+    /// Returns when the last of the next bytes arrives of a request that was sent at `asked`: requests wait for their
+    /// first byte side by side, and take turns.
     fn arrival(&self, asked: Instant, bytes: usize) -> Instant {
         let mut traffic = self.lock();
         let first = asked + self.quality.latency;
@@ -175,6 +175,9 @@ impl AssetReader for LinkReader {
     }
 }
 
+/// Most bytes that a request brings before it is the turn of others.
+const TURN: usize = 64 << 10;
+
 /// A file, or a part of it, on its way: the bytes that are read, from one position on, are one request.
 struct OverLink<'a> {
     file: Box<dyn Reader + 'a>,
@@ -194,7 +197,7 @@ impl AsyncRead for OverLink<'_> {
         let (link, is_index) = (own.link, own.is_index);
         let (asked, is_lost) = *own.request.get_or_insert_with(|| (Instant::now(), link.ask(is_index)));
         if own.wait.is_none() && own.arrived.is_empty() {
-            let mut bytes = vec![0; buffer.len()];
+            let mut bytes = vec![0; buffer.len().min(TURN)];
             let count = ready!(Pin::new(&mut own.file).poll_read(context, &mut bytes))?;
             bytes.truncate(count);
             let arrival = if is_lost { asked + link.quality.latency } else { link.arrival(asked, count) };

@@ -1,20 +1,24 @@
 //! Captures in one file of an index and its chunk files, of which Bevy reads parts.
 //!
-//! In: a file that `gs4d split` has written, on a disk and on servers that send parts, fail now and then, or send none.
-//! Out: proof that the parts that are played are read, and no others; that failures are made good; that without parts
-//! all of the file is played. `stream.rs` has the pictures.
+//! In: a file that `gs4d split` has written, on a disk and on servers that send parts, over TLS or not, fail now and
+//! then, or send none. Out: proof that the parts that are played are read, and no others, through few connections; that
+//! failures are made good; that without parts all of the file is played; that servers are trusted as the system says.
+//! `stream.rs` has the pictures.
 
 use crate::support::range_server::{Answers, RangeServer};
 use crate::support::split::SPLIT;
 use crate::support::waiting::wait_until;
+use bevy::asset::LoadState;
 use bevy::prelude::*;
 use bevy_gs4d::codec::package::Following;
 use bevy_gs4d::codec::stream::StreamSchedule;
 use bevy_gs4d::prelude::*;
 use bevy_gs4d::stream::{CaptureStreamState, HttpRangesPlugin, StreamBudget};
 use std::collections::BTreeSet;
-use std::fs;
 use std::ops::Range;
+use std::path::Path;
+use std::process::Command;
+use std::{env, fs};
 
 /// Returns an app without a renderer that loads nothing ahead.
 fn app(folder: &str) -> App {
@@ -84,6 +88,8 @@ fn a_server_is_asked_for_the_parts_that_are_played() {
         assert_eq!(files.iter().copied().collect::<BTreeSet<_>>(), parts(2.2), "the parts of the time, and no others");
         assert_eq!(state(&app, entity).failures > 0, fail_every > 0, "requests that failed were made again: {asked:?}");
         assert!(fail_every > 0 || files.len() == parts(2.2).len(), "each part once: {asked:?}");
+        let most = StreamBudget::default().requests as usize + 1;
+        assert!(server.connections() <= most, "{} connections for {} requests", server.connections(), asked.len());
     }
 }
 
@@ -100,4 +106,57 @@ fn the_capture_of_a_server_without_parts_is_played_whole() {
     assert_eq!((capture.scene().len() as u64, &capture.scene().chunks), (all, &None), "the whole capture");
     assert_eq!(server.asked().len(), 1, "the file is sent once: {:?}", server.asked());
     assert!(app.world().get::<CaptureStreamState>(entity).is_none(), "nothing is streamed");
+}
+
+/// The address of the server of [`a_client_of_tls`], which runs it in a process of its own.
+const TLS_SERVER: &str = "GS4D_TEST_TLS_SERVER";
+const LOADED: &str = "loaded in parts";
+
+#[test]
+fn servers_of_https_are_trusted_by_the_certificates_of_the_system() {
+    let (server, certificate) = RangeServer::over_tls(SPLIT.one.clone(), Answers::default());
+    let (_, other) = RangeServer::over_tls(Vec::new(), Answers::default());
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let client = |certificates: &Path| {
+        let output = Command::new(env::current_exe().expect("the path of the tests"))
+            .args(["--exact", "one_file::a_client_of_tls", "--ignored", "--nocapture"])
+            .env(TLS_SERVER, &server.address)
+            // Where the certificates of the system are.
+            .env("SSL_CERT_FILE", certificates)
+            .env_remove("SSL_CERT_DIR")
+            .output()
+            .expect("a client");
+        assert!(output.status.success(), "the client failed: {output:?}");
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    };
+    let trusted = |name: &str, pem: &str| {
+        let path = folder.path().join(name);
+        fs::write(&path, pem).expect("the folder can be written to");
+        client(&path)
+    };
+    let refused = trusted("other.pem", &other);
+    assert!(refused.contains("certificate") && !refused.contains(LOADED), "a server without trust: {refused}");
+    assert_eq!(server.asked(), [], "which is not asked for anything");
+    let loaded = trusted("own.pem", &certificate);
+    assert!(loaded.contains(LOADED), "a server that is trusted: {loaded}");
+    assert!(server.asked().iter().all(Option::is_some), "which is asked for parts: {:?}", server.asked());
+}
+
+#[test]
+#[ignore = "run by servers_of_https_are_trusted_by_the_certificates_of_the_system"]
+fn a_client_of_tls() {
+    let Ok(address) = env::var(TLS_SERVER) else {
+        println!("skipped: {TLS_SERVER} is not set");
+        return;
+    };
+    let mut app = app("assets");
+    let entity = spawn(&mut app, format!("https://{address}"), 2.2);
+    let handle = app.world().get::<GaussianCapture3d>(entity).expect("a capture").0.clone();
+    let load_state = |app: &App| app.world().resource::<AssetServer>().load_state(&handle);
+    let has_ended = |app: &App| state(app, entity).is_whole() || load_state(app).is_failed();
+    wait_until(&mut app, "the file", has_ended, App::update);
+    match load_state(&app) {
+        LoadState::Failed(error) => println!("{error}"),
+        _ => println!("{LOADED}: {} files", state(&app, entity).resident),
+    }
 }

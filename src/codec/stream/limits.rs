@@ -24,6 +24,9 @@ pub struct StreamLimits {
     /// played later comes before the last layer of now. Less suits a link that is fast for the capture. Counts as at
     /// least a millisecond. Default: [`LAYER_SECONDS`](Self::LAYER_SECONDS).
     pub layer_seconds: f64,
+    /// A file of more bytes is long: only one such file is on its way at once, so that it leaves a part of a slow link to
+    /// those that are played sooner. Default: none is long.
+    pub long_bytes: u64,
 }
 
 impl StreamLimits {
@@ -47,7 +50,14 @@ impl StreamLimits {
 
 impl Default for StreamLimits {
     fn default() -> Self {
-        Self { gpu_bytes: 1 << 30, host_bytes: 512 << 20, requests: 4, ahead: 10.0, layer_seconds: Self::LAYER_SECONDS }
+        Self {
+            gpu_bytes: 1 << 30,
+            host_bytes: 512 << 20,
+            requests: 4,
+            ahead: 10.0,
+            layer_seconds: Self::LAYER_SECONDS,
+            long_bytes: u64::MAX,
+        }
     }
 }
 

@@ -141,7 +141,7 @@ impl Host {
             8 => heads.iter_mut().for_each(|head| head.velocity = -head.velocity),
             _ => {}
         }
-        match random.below(12) {
+        match random.below(14) {
             0 => limits.gpu_bytes = random.below(60_000) as u64,
             1 => limits.gpu_bytes = random.below(6000) as u64,
             2 => limits.gpu_bytes = u64::MAX,
@@ -150,6 +150,8 @@ impl Host {
             5 => limits.requests = random.below(8),
             6 => limits.ahead = f64::from(random.in_range(-1.0, 20.0)),
             7 => limits.layer_seconds = f64::from(random.in_range(0.01, 2.0)),
+            8 => limits.long_bytes = random.below(2000) as u64,
+            9 => limits.long_bytes = u64::MAX,
             _ => {}
         }
     }
@@ -173,6 +175,10 @@ impl Host {
             let is_too_large = self.bytes(*file)[0] > self.limits.gpu_bytes;
             assert!(is_too_large || !self.urgency(&demand, *file).is_wanted, "request {file} is of use: {at}");
         }
+        let is_long = |file: &&usize| self.table.files[**file].bytes > self.limits.long_bytes;
+        let (on_the_way, fetched) =
+            (self.requested.iter().any(|file| is_long(&file)), plan.fetch.iter().filter(is_long));
+        assert!(fetched.count() <= usize::from(!on_the_way), "one long file at once: {at}");
         for file in &plan.fetch {
             assert!(!plan.give_up.contains(file), "file {file} is fetched and given up: {at}");
             assert!(!self.resident.contains(file), "file {file} is fetched although it is there: {at}");

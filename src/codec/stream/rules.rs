@@ -190,6 +190,22 @@ fn the_first_file_without_room_holds_up_the_others() {
 }
 
 #[test]
+fn one_long_file_is_on_its_way_at_once_and_short_ones_overtake_the_others() {
+    // Urgencies: 0, 1.5, 3, 0, 1.5 s.
+    let files = [([0, 2], 0, 60), ([0, 2], 1, 60), ([0, 2], 2, 60), ([0, 0], 0, 10), ([2, 2], 0, 10)];
+    let mut schedule = schedule(3, &files);
+    let limits = StreamLimits { long_bytes: 10, ..limits(1000, 2) };
+    let heads = [head(0.5, 1.0, Turn::Stop)];
+    assert_eq!(schedule.plan(0.0, &heads, &limits).fetch, [0, 3], "a long file and a short one");
+    assert!(schedule.arrived(3), "the short one is there");
+    assert_eq!(schedule.plan(0.0, &heads, &limits).fetch, [4], "the next short one overtakes long ones");
+    assert!(schedule.arrived(4), "it is there");
+    assert_eq!(schedule.plan(0.0, &heads, &limits).fetch, [0; 0], "the other long files wait");
+    assert!(schedule.arrived(0), "the long file is there");
+    assert_eq!(schedule.plan(0.0, &heads, &limits).fetch, [1], "the next");
+}
+
+#[test]
 fn a_file_that_is_larger_than_all_memory_is_left_out() {
     let files = [([0, 2], 0, 101), ([0, 0], 0, 50), ([1, 1], 0, 50)];
     let mut schedule = schedule(3, &files);
@@ -413,8 +429,14 @@ fn tables_and_players_without_sense_have_plans() {
                 for turn in [Turn::Stop, Turn::Loop, Turn::Return] {
                     let head = Playhead { seconds: *a, velocity: b, range: [b, *a], turn, delay: *a };
                     let (all, requests) = (u64::MAX, usize::MAX);
-                    let limits =
-                        StreamLimits { gpu_bytes: all, host_bytes: all, requests, ahead: *a, layer_seconds: b };
+                    let limits = StreamLimits {
+                        gpu_bytes: all,
+                        host_bytes: all,
+                        requests,
+                        ahead: *a,
+                        layer_seconds: b,
+                        ..StreamLimits::default()
+                    };
                     for file in schedule.plan(*a, &[head, head], &limits).fetch {
                         schedule.arrived(file);
                     }

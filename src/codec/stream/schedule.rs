@@ -65,8 +65,9 @@ pub struct StreamSchedule {
     coarse: Intervals,
     /// The latest time of the host's clock, in seconds.
     now: f64,
-    /// Bytes of all files.
+    /// Bytes of all files, and of the longest.
     all_bytes: u64,
+    longest: u64,
     /// How much later each layer may come.
     delays: Delays,
 }
@@ -85,6 +86,7 @@ impl StreamSchedule {
             ),
             now: 0.0,
             all_bytes: table.bytes_up_to(ChunkTable::MOST_LAYERS),
+            longest: table.files.iter().map(|file| file.bytes).max().unwrap_or(0),
             delays: table.delays(),
             ledger: Ledger::new(table),
         }
@@ -114,6 +116,7 @@ impl StreamSchedule {
     ///
     /// A file is fetched if a player reaches it within [`StreamLimits::ahead`] seconds. If the next file does not find
     /// room, those after it wait, too, except for a file that is larger than all memory on the GPU, which is left out.
+    /// While a file of more than [`StreamLimits::long_bytes`] is on its way, other such files wait, and shorter ones do not.
     /// Requests that no player needs any more are given up, so that nothing waits for them after a jump in time. Those
     /// that have taken 30 s, and a second more for each 32 KiB of the file, are given up and count as
     /// [failed](Self::failed).
@@ -146,8 +149,9 @@ impl StreamSchedule {
         }
         for urgency in candidates {
             let file = urgency.file;
-            if self.state(file) == FileState::Requested {
-                // Several players need the file.
+            // Several players need the file, or it is long, as one that this plan fetches for another player.
+            let is_second = self.is_long(file, limits) && self.has_long_request(limits);
+            if self.state(file) == FileState::Requested || is_second {
                 continue;
             }
             if self.requested() >= limits.requests || !self.ledger.has_host_room(file, limits.host_bytes) {
@@ -293,8 +297,17 @@ impl StreamSchedule {
         is_reached && self.gpu_bytes_of(file) <= limits.gpu_bytes
     }
 
-    /// Returns the files that may be fetched, the most urgent first. A file that several players need may occur more
-    /// than once.
+    /// Returns whether only one file of its length is on its way at once.
+    fn is_long(&self, file: usize, limits: &StreamLimits) -> bool {
+        self.table().files.get(file).is_some_and(|chunk| chunk.bytes > limits.long_bytes)
+    }
+
+    fn has_long_request(&self, limits: &StreamLimits) -> bool {
+        self.ledger.requested().iter().any(|file| self.is_long(*file, limits))
+    }
+
+    /// Returns the files that may be fetched, the most urgent first: of long ones the first of each player, unless one is
+    /// on its way. A file that several players need may occur more than once.
     fn candidates(&self, demand: &Demand, limits: &StreamLimits) -> BTreeSet<Urgency> {
         let count = limits.requests.saturating_sub(self.requested());
         if count == 0 {
@@ -304,10 +317,17 @@ impl StreamSchedule {
             let is_absent = self.state(*file) == FileState::Absent;
             is_absent && self.gpu_bytes_of(*file) <= limits.gpu_bytes && !self.waits(*file)
         };
-        demand.most_urgent(count, |[from, to]| {
-            let files = self.files.along(from, to).filter(may_be_fetched);
-            files.filter_map(|file| Some((file, self.table().files.get(file)?)))
-        })
+        let most_urgent = |count: usize, are_long: bool| {
+            demand.most_urgent(count, |[from, to]| {
+                let alike = self.files.along(from, to).filter(move |file| self.is_long(*file, limits) == are_long);
+                alike.filter(may_be_fetched).filter_map(|file| Some((file, self.table().files.get(file)?)))
+            })
+        };
+        let mut candidates = most_urgent(count, false);
+        if self.longest > limits.long_bytes && !self.has_long_request(limits) {
+            candidates.append(&mut most_urgent(1, true));
+        }
+        candidates
     }
 
     /// Returns the files that are there, the one that is needed last first.

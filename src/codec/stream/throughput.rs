@@ -2,7 +2,7 @@
 //! least important ones of now.
 //!
 //! In: in each frame, its length, whether files are on their way, the bytes of those that have arrived; how many bytes
-//! playing needs. Out: the seconds by which each layer may come later.
+//! playing needs. Out: the seconds by which each layer may come later, and which files are long for the link.
 
 use super::limits::StreamLimits;
 
@@ -15,6 +15,11 @@ const FAST: f64 = 0.1;
 /// A link becomes fast, and is not any more, at these multiples of the bytes per second that playing needs.
 const FAST_FROM: f64 = 4.0;
 const SLOW_FROM: f64 = 1.5;
+/// Seconds from which on a file is long, alone on the link.
+const LONG: f64 = 1.0;
+/// Bytes from which on a file is long over a link whose throughput is not known, and over the slowest.
+const LONG_UNKNOWN: u64 = 1 << 20;
+const LONG_AT_LEAST: u64 = 64 << 10;
 
 /// The bytes of files that have arrived, and the seconds for which files were on their way, of the last few such
 /// seconds.
@@ -47,6 +52,14 @@ impl Throughput {
     pub fn layer_seconds(self, has_room: bool) -> f64 {
         if self.is_fast && has_room { FAST } else { StreamLimits::LAYER_SECONDS }
     }
+
+    /// Returns [`StreamLimits::long_bytes`] of all captures: files that take longer than a second.
+    pub fn long_bytes(self) -> u64 {
+        match self.seconds >= LEAST_SECONDS {
+            true => ((self.bytes / self.seconds * LONG) as u64).max(LONG_AT_LEAST),
+            false => LONG_UNKNOWN,
+        }
+    }
 }
 
 #[cfg(test)]
@@ -70,6 +83,17 @@ mod tests {
         let seconds = |needed: f64| play(&mut Throughput::default(), 100_000, needed);
         assert_eq!([seconds(1e5), seconds(5e5), seconds(2e6)], [FAST, SLOW, SLOW], "ten times, twice, and half");
         assert_eq!([seconds(f64::INFINITY), seconds(0.0)], [SLOW, FAST], "a still, and nothing");
+    }
+
+    #[test]
+    fn files_are_long_that_take_more_than_a_second() {
+        let mut throughput = Throughput::default();
+        assert_eq!(throughput.long_bytes(), LONG_UNKNOWN, "at the beginning");
+        throughput.add(0.5, true, 0, 1e5);
+        assert_eq!(throughput.long_bytes(), LONG_AT_LEAST, "nothing has arrived yet");
+        // A million bytes per second.
+        play(&mut throughput, 100_000, 1e5);
+        assert!((900_000..1_200_000).contains(&throughput.long_bytes()), "{} bytes", throughput.long_bytes());
     }
 
     #[test]

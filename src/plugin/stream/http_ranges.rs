@@ -4,6 +4,7 @@
 //! read, at first for 64 KiB. A file that is read to its end from its beginning is asked for whole. A server that
 //! answers a range with all of the file gives no parts: then the reader does not seek, and has all bytes.
 
+use super::http_request::{Client, Request, Response};
 use crate::plugin::asset::PartSources;
 use async_channel::Receiver;
 use bevy::app::{App, Plugin};
@@ -14,19 +15,13 @@ use bevy::asset::io::{
 use bevy::asset::{AssetApp, AssetPlugin};
 use bevy::log::warn;
 use bevy::tasks::futures_lite::{AsyncRead, AsyncSeek, Stream};
-use ehttp::{Request, Response};
 use std::io::{Error, ErrorKind, SeekFrom};
 use std::path::Path;
 use std::pin::Pin;
 use std::task::{Context, Poll, ready};
-use std::time::Duration;
 
 /// Bytes that the first request of a file asks for: enough for the index of a capture of a minute.
 const FIRST: u64 = 1 << 16;
-/// Outside browsers, the answer with a part has to be received within this time, and a second more for each so many
-/// bytes. Chunk files are asked for again after their own deadline.
-const PATIENCE: Duration = Duration::from_secs(30);
-const LEAST_BYTES_PER_SECOND: u64 = 32 << 10;
 
 /// Loads assets from servers, of captures in one file only the parts that are played: the asset sources `http` and
 /// `https`. Add it before Bevy's `AssetPlugin`, which `DefaultPlugins` has, and leave Bevy's features `http` and
@@ -58,35 +53,39 @@ impl Plugin for HttpRangesPlugin {
             return;
         }
         app.init_resource::<PartSources>();
-        let sources = app.world().resource::<PartSources>().clone();
+        let (sources, client) = (app.world().resource::<PartSources>().clone(), Client::default());
         for scheme in ["http", "https"] {
-            let (own, processed) = (sources.clone(), sources.clone());
-            let builder = AssetSourceBuilder::new(move || Box::new(Server { scheme, sources: own.clone() }))
-                .with_processed_reader(move || Box::new(Server { scheme, sources: processed.clone() }));
+            let own = Server { scheme, sources: sources.clone(), client: client.clone() };
+            let processed = own.clone();
+            let builder = AssetSourceBuilder::new(move || Box::new(own.clone()))
+                .with_processed_reader(move || Box::new(processed.clone()));
             app.register_asset_source(scheme, builder);
         }
     }
 }
 
 /// The files of all servers of a scheme.
+#[derive(Clone)]
 struct Server {
     scheme: &'static str,
     sources: PartSources,
+    client: Client,
 }
 
 impl Server {
-    fn url(&self, path: &Path) -> String {
+    /// Returns a reader that has not asked for anything yet.
+    fn reader(&self, path: &Path) -> RangeReader {
         // Paths of assets are separated by the separators of the system.
         let path = path.to_string_lossy().replace(std::path::MAIN_SEPARATOR, "/");
-        format!("{}://{path}", self.scheme)
+        RangeReader::new(self.client.clone(), format!("{}://{path}", self.scheme))
     }
 }
 
 impl AssetReader for Server {
-    /// Returns a reader that has not asked for anything yet: a file that is not there is told when it is read.
+    /// A file that is not there is told when it is read.
     async fn read<'a>(&'a self, path: &'a Path) -> Result<impl Reader + 'a, AssetReaderError> {
         self.sources.note(self.scheme);
-        Ok(RangeReader::new(self.url(path)))
+        Ok(self.reader(path))
     }
 
     async fn read_meta<'a>(&'a self, path: &'a Path) -> Result<impl Reader + 'a, AssetReaderError> {
@@ -97,7 +96,7 @@ impl AssetReader for Server {
             return Err(AssetReaderError::NotFound(meta.into()));
         }
         let mut bytes = Vec::new();
-        let read = RangeReader::new(self.url(Path::new(&meta))).read_to_end(&mut bytes).await;
+        let read = self.reader(Path::new(&meta)).read_to_end(&mut bytes).await;
         match read {
             Ok(_) => Ok(VecReader::new(bytes)),
             // Buckets forbid what is not there.
@@ -130,6 +129,7 @@ struct Answer {
 
 /// A file of a server.
 struct RangeReader {
+    client: Client,
     url: String,
     position: u64,
     /// The last answer.
@@ -139,9 +139,9 @@ struct RangeReader {
 }
 
 impl RangeReader {
-    fn new(url: String) -> Self {
+    fn new(client: Client, url: String) -> Self {
         let held = Answer { start: 0, bytes: Vec::new(), length: None, is_whole: false };
-        Self { url, position: 0, held, asked: None }
+        Self { client, url, position: 0, held, asked: None }
     }
 
     /// Returns the bytes from the position on that have been received.
@@ -158,8 +158,8 @@ impl RangeReader {
     /// file.
     fn poll_at_hand(&mut self, context: &mut Context<'_>, count: Option<u64>) -> Poll<Result<(), Error>> {
         while self.at_hand().is_empty() && !self.has_ended() {
-            let (url, position) = (&self.url, self.position);
-            let asked = self.asked.get_or_insert_with(|| Box::pin(ask(url, position, count)));
+            let (client, url, position) = (&self.client, &self.url, self.position);
+            let asked = self.asked.get_or_insert_with(|| Box::pin(ask(client, url, position, count)));
             let answer = ready!(asked.as_mut().poll_next(context));
             self.asked = None;
             self.held = answer.unwrap_or_else(|| Err(Error::other("the request was given up")))?;
@@ -169,29 +169,11 @@ impl RangeReader {
 }
 
 /// Asks a server for bytes of a file from a position on: for `count` bytes, or all up to the end of the file.
-fn ask(url: &str, position: u64, count: Option<u64>) -> Receiver<Result<Answer, Error>> {
+fn ask(client: &Client, url: &str, position: u64, count: Option<u64>) -> Receiver<Result<Answer, Error>> {
     let (sender, receiver) = async_channel::bounded(1);
-    let mut request = Request::get(url);
-    // Parts of a compressed answer are not parts of the file. Browsers see to this themselves.
-    #[cfg(not(target_arch = "wasm32"))]
-    request.headers.insert("Accept-Encoding", "identity");
-    request.timeout = count.map(|count| PATIENCE + Duration::from_secs(count / LEAST_BYTES_PER_SECOND));
-    match count {
-        Some(count) => {
-            let last = position.saturating_add(count.max(1)) - 1;
-            request.headers.insert("Range", format!("bytes={position}-{last}"));
-        }
-        None if position > 0 => request.headers.insert("Range", format!("bytes={position}-")),
-        None => {}
-    }
-    // Those of the page that the app is in.
-    #[cfg(target_arch = "wasm32")]
-    {
-        request.credentials = ehttp::Credentials::SameOrigin;
-    }
-    ehttp::fetch(request, move |response| {
+    client.fetch(Request { url: url.to_owned(), position, count }, move |response| {
         // The reader may be gone.
-        let _ = sender.try_send(response.map_err(Error::other).and_then(|response| answer(response, position, count)));
+        let _ = sender.try_send(response.and_then(|response| answer(response, position, count)));
     });
     receiver
 }
@@ -203,7 +185,7 @@ fn answer(response: Response, position: u64, count: Option<u64>) -> Result<Answe
         200 if position > 0 => Err(Error::other("the server sends no parts of the file any more")),
         200 => Ok(Answer { start: 0, bytes: response.bytes, length: Some(received), is_whole: count.is_some() }),
         206 => {
-            let (start, length) = match response.headers.get("content-range").map(content_range) {
+            let (start, length) = match response.content_range.as_deref().map(content_range) {
                 Some(Some((start, length))) => (start, length),
                 Some(None) => return Err(Error::other("the server has sent a part that it does not describe")),
                 // Browsers show the header of another origin to no page that the server does not list.
@@ -301,10 +283,8 @@ mod tests {
     use super::*;
 
     fn response(status: u16, range: Option<&str>, bytes: &[u8]) -> Response {
-        let mut headers = ehttp::Headers::default();
-        range.into_iter().for_each(|range| headers.insert("content-range", range));
-        let (url, status_text, bytes) = (String::new(), "Said".to_owned(), bytes.to_vec());
-        Response { url, ok: status < 300, status, status_text, headers, bytes }
+        let content_range = range.map(str::to_owned);
+        Response { status, status_text: "Said".to_owned(), content_range, bytes: bytes.to_vec() }
     }
 
     #[test]

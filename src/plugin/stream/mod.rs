@@ -26,6 +26,8 @@ mod faults;
 mod heads;
 #[cfg(feature = "http_ranges")]
 mod http_ranges;
+#[cfg(feature = "http_ranges")]
+mod http_request;
 mod messages;
 mod pictures;
 mod plugin;

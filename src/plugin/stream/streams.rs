@@ -331,7 +331,8 @@ pub(super) fn fetch_files(
         // Pages may lack the memory to grow.
         let gpu_bytes = uploads.paged(*id).map_or(gpu_bytes, |bytes| bytes.min(gpu_bytes));
         let ahead = budget.ahead_seconds.into();
-        let limits = StreamLimits { gpu_bytes, host_bytes, requests, ahead, layer_seconds };
+        let long_bytes = throughput.long_bytes();
+        let limits = StreamLimits { gpu_bytes, host_bytes, requests, ahead, layer_seconds, long_bytes };
         stream.follow(*id, now, heads, &limits, &server, &uploads);
         stream.on_the_way()
     });

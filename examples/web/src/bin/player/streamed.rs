@@ -154,6 +154,7 @@ impl Streamed {
             requests: REQUESTS,
             ahead: AHEAD,
             layer_seconds,
+            long_bytes: self.throughput.long_bytes(),
         };
         let plan = self.schedule.plan(self.now, &heads, &limits);
         for file in &plan.give_up {
