@@ -88,8 +88,8 @@ fn a_server_is_asked_for_the_parts_that_are_played() {
         assert_eq!(files.iter().copied().collect::<BTreeSet<_>>(), parts(2.2), "the parts of the time, and no others");
         assert_eq!(state(&app, entity).failures > 0, fail_every > 0, "requests that failed were made again: {asked:?}");
         assert!(fail_every > 0 || files.len() == parts(2.2).len(), "each part once: {asked:?}");
-        let most = StreamBudget::default().requests as usize + 1;
-        assert!(server.connections() <= most, "{} connections for {} requests", server.connections(), asked.len());
+        let connections = server.connections();
+        assert!(connections <= MOST_CONNECTIONS, "{connections} connections for {} requests", asked.len());
     }
 }
 
@@ -108,11 +108,14 @@ fn the_capture_of_a_server_without_parts_is_played_whole() {
     assert!(app.world().get::<CaptureStreamState>(entity).is_none(), "nothing is streamed");
 }
 
+/// Those of all requests at a time, and one that may not have ended before the next begins.
+const MOST_CONNECTIONS: usize = 5;
 /// The address of the server of [`a_client_of_tls`], which runs it in a process of its own.
 const TLS_SERVER: &str = "GS4D_TEST_TLS_SERVER";
 const LOADED: &str = "loaded in parts";
 
 #[test]
+#[cfg(target_os = "linux")]
 fn servers_of_https_are_trusted_by_the_certificates_of_the_system() {
     let (server, certificate) = RangeServer::over_tls(SPLIT.one.clone(), Answers::default());
     let (_, other) = RangeServer::over_tls(Vec::new(), Answers::default());
@@ -135,11 +138,15 @@ fn servers_of_https_are_trusted_by_the_certificates_of_the_system() {
         client(&path)
     };
     let refused = trusted("other.pem", &other);
-    assert!(refused.contains("certificate") && !refused.contains(LOADED), "a server without trust: {refused}");
+    assert!(
+        refused.contains("invalid peer certificate") && !refused.contains(LOADED),
+        "a server without trust: {refused}"
+    );
     assert_eq!(server.asked(), [], "which is not asked for anything");
     let loaded = trusted("own.pem", &certificate);
     assert!(loaded.contains(LOADED), "a server that is trusted: {loaded}");
     assert!(server.asked().iter().all(Option::is_some), "which is asked for parts: {:?}", server.asked());
+    assert!(server.connections() <= MOST_CONNECTIONS, "{} connections", server.connections());
 }
 
 #[test]

@@ -128,9 +128,9 @@ fn answer(
         seen.asked.iter().flatten().count()
     };
     match range {
-        _ if path != "/take.gs4d" => send(stream, "404 Not Found", b""),
+        _ if path != "/take.gs4d" => send(stream, "404 Not Found", b"no such file"),
         Some(_) if answers.fail_every > 0 && parts.is_multiple_of(answers.fail_every) => {
-            send(stream, "503 Service Unavailable", b"")
+            send(stream, "503 Service Unavailable", b"come again")
         }
         Some(range) if !answers.no_parts => {
             let (status, part) = part_of(file, range);
@@ -145,6 +145,5 @@ fn send(stream: &mut impl Write, status: &str, body: &[u8]) -> Option<()> {
     let head = format!("HTTP/1.1 {status}\r\nContent-Length: {length}\r\n\r\n");
     stream.write_all(head.as_bytes()).ok()?;
     stream.write_all(body).ok()?;
-    // TLS holds a record back that is not full.
     stream.flush().ok()
 }

@@ -24,8 +24,8 @@ pub struct StreamLimits {
     /// played later comes before the last layer of now. Less suits a link that is fast for the capture. Counts as at
     /// least a millisecond. Default: [`LAYER_SECONDS`](Self::LAYER_SECONDS).
     pub layer_seconds: f64,
-    /// A file of more bytes is long: only one such file is on its way at once, so that it leaves a part of a slow link to
-    /// those that are played sooner. Default: none is long.
+    /// A file of more bytes is long: only one such file is on its way at a time, so that short files that are played
+    /// sooner are not held up on a slow link. Default: none is long.
     pub long_bytes: u64,
 }
 

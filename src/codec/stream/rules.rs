@@ -190,7 +190,7 @@ fn the_first_file_without_room_holds_up_the_others() {
 }
 
 #[test]
-fn one_long_file_is_on_its_way_at_once_and_short_ones_overtake_the_others() {
+fn only_one_long_file_is_on_its_way_and_short_ones_overtake_the_others() {
     // Urgencies: 0, 1.5, 3, 0, 1.5 s.
     let files = [([0, 2], 0, 60), ([0, 2], 1, 60), ([0, 2], 2, 60), ([0, 0], 0, 10), ([2, 2], 0, 10)];
     let mut schedule = schedule(3, &files);
@@ -203,6 +203,17 @@ fn one_long_file_is_on_its_way_at_once_and_short_ones_overtake_the_others() {
     assert_eq!(schedule.plan(0.0, &heads, &limits).fetch, [0; 0], "the other long files wait");
     assert!(schedule.arrived(0), "the long file is there");
     assert_eq!(schedule.plan(0.0, &heads, &limits).fetch, [1], "the next");
+}
+
+#[test]
+fn a_long_file_does_not_hold_up_layer_0_of_now() {
+    let files = [([0, 5], 1, 60), ([0, 0], 0, 60), ([4, 4], 0, 60), ([5, 5], 0, 60)];
+    let mut schedule = schedule(6, &files);
+    let limits = StreamLimits { long_bytes: 10, ahead: 1.0, ..limits(1000, 4) };
+    assert_eq!(schedule.plan(0.0, &[head(2.5, 1.0, Turn::Stop)], &limits).fetch, [0], "a long file");
+    let jumped = [head(4.5, 1.0, Turn::Stop)];
+    assert_eq!(schedule.plan(0.0, &jumped, &limits).fetch, [2], "after a jump, layer 0 of then comes beside it");
+    assert_eq!(schedule.plan(0.0, &jumped, &limits).fetch, [0; 0], "what is played later waits");
 }
 
 #[test]

@@ -116,7 +116,8 @@ impl StreamSchedule {
     ///
     /// A file is fetched if a player reaches it within [`StreamLimits::ahead`] seconds. If the next file does not find
     /// room, those after it wait, too, except for a file that is larger than all memory on the GPU, which is left out.
-    /// While a file of more than [`StreamLimits::long_bytes`] is on its way, other such files wait, and shorter ones do not.
+    /// While a file of more than [`StreamLimits::long_bytes`] is on its way, other such files wait, unless they are of layer
+    /// 0 and drawn now; shorter ones do not wait.
     /// Requests that no player needs any more are given up, so that nothing waits for them after a jump in time. Those
     /// that have taken 30 s, and a second more for each 32 KiB of the file, are given up and count as
     /// [failed](Self::failed).
@@ -149,9 +150,9 @@ impl StreamSchedule {
         }
         for urgency in candidates {
             let file = urgency.file;
-            // Several players need the file, or it is long, as one that this plan fetches for another player.
-            let is_second = self.is_long(file, limits) && self.has_long_request(limits);
-            if self.state(file) == FileState::Requested || is_second {
+            // This plan fetches the file, or another long one, for another player.
+            let is_second_long = self.is_long(file, limits) && self.has_long_request(limits) && !urgency.is_due();
+            if self.state(file) == FileState::Requested || is_second_long {
                 continue;
             }
             if self.requested() >= limits.requests || !self.ledger.has_host_room(file, limits.host_bytes) {
@@ -297,17 +298,18 @@ impl StreamSchedule {
         is_reached && self.gpu_bytes_of(file) <= limits.gpu_bytes
     }
 
-    /// Returns whether only one file of its length is on its way at once.
+    /// Returns whether a file is longer than [`StreamLimits::long_bytes`].
     fn is_long(&self, file: usize, limits: &StreamLimits) -> bool {
         self.table().files.get(file).is_some_and(|chunk| chunk.bytes > limits.long_bytes)
     }
 
+    /// Returns whether a long file is on its way.
     fn has_long_request(&self, limits: &StreamLimits) -> bool {
         self.ledger.requested().iter().any(|file| self.is_long(*file, limits))
     }
 
-    /// Returns the files that may be fetched, the most urgent first: of long ones the first of each player, unless one is
-    /// on its way. A file that several players need may occur more than once.
+    /// Returns the files that may be fetched, the most urgent first: of long ones the first of each player, while one is on
+    /// its way only if it is of layer 0 and drawn now. A file that several players need may occur more than once.
     fn candidates(&self, demand: &Demand, limits: &StreamLimits) -> BTreeSet<Urgency> {
         let count = limits.requests.saturating_sub(self.requested());
         if count == 0 {
@@ -324,8 +326,10 @@ impl StreamSchedule {
             })
         };
         let mut candidates = most_urgent(count, false);
-        if self.longest > limits.long_bytes && !self.has_long_request(limits) {
-            candidates.append(&mut most_urgent(1, true));
+        if self.longest > limits.long_bytes {
+            let has_long_request = self.has_long_request(limits);
+            let long = most_urgent(1, true).into_iter();
+            candidates.extend(long.filter(|urgency| !has_long_request || urgency.is_due()));
         }
         candidates
     }

@@ -19,7 +19,7 @@ const SLOW_FROM: f64 = 1.5;
 const LONG: f64 = 1.0;
 /// Bytes from which on a file is long over a link whose throughput is not known, and over the slowest.
 const LONG_UNKNOWN: u64 = 1 << 20;
-const LONG_AT_LEAST: u64 = 64 << 10;
+const LONG_AT_LEAST: u64 = 256 << 10;
 
 /// The bytes of files that have arrived, and the seconds for which files were on their way, of the last few such
 /// seconds.
@@ -55,7 +55,7 @@ impl Throughput {
 
     /// Returns [`StreamLimits::long_bytes`] of all captures: files that take longer than a second.
     pub fn long_bytes(self) -> u64 {
-        match self.seconds >= LEAST_SECONDS {
+        match self.seconds >= LEAST_SECONDS && self.bytes > 0.0 {
             true => ((self.bytes / self.seconds * LONG) as u64).max(LONG_AT_LEAST),
             false => LONG_UNKNOWN,
         }
@@ -90,7 +90,9 @@ mod tests {
         let mut throughput = Throughput::default();
         assert_eq!(throughput.long_bytes(), LONG_UNKNOWN, "at the beginning");
         throughput.add(0.5, true, 0, 1e5);
-        assert_eq!(throughput.long_bytes(), LONG_AT_LEAST, "nothing has arrived yet");
+        assert_eq!(throughput.long_bytes(), LONG_UNKNOWN, "nothing has arrived yet");
+        throughput.add(0.5, true, 1000, 1e5);
+        assert_eq!(throughput.long_bytes(), LONG_AT_LEAST, "a slow link");
         // A million bytes per second.
         play(&mut throughput, 100_000, 1e5);
         assert!((900_000..1_200_000).contains(&throughput.long_bytes()), "{} bytes", throughput.long_bytes());

@@ -121,7 +121,12 @@ impl Urgency {
     /// Returns the least urgency of the files that may be given up for this one.
     pub(super) fn least_given_up(&self) -> f64 {
         // Layer 0 of now is worth all that is drawn later.
-        if self.next_use > 0.0 { self.seconds() + HYSTERESIS } else { f64::MIN_POSITIVE }
+        if self.is_due() { f64::MIN_POSITIVE } else { self.seconds() + HYSTERESIS }
+    }
+
+    /// Returns whether the file is of layer 0 and drawn now.
+    pub(super) fn is_due(&self) -> bool {
+        self.next_use <= 0.0
     }
 }
 

@@ -43,20 +43,21 @@ pub(super) use native::Client;
 #[cfg(not(target_arch = "wasm32"))]
 mod native {
     use super::{Error, Request, Response};
-    use std::io::Read;
+    use std::io::{ErrorKind, Read, copy, sink};
     use std::thread;
     use std::time::Duration;
     use ureq::http::header::{ACCEPT_ENCODING, CONTENT_RANGE, RANGE};
     use ureq::tls::{RootCerts, TlsConfig};
     use ureq::{Agent, Body};
 
-    /// A server has to accept a connection, and to begin an answer, within this time.
+    /// A server has to accept a connection, to begin an answer, and to send each next piece of it within this time. Chunk
+    /// files are asked for again after their own deadline.
     const PATIENCE: Duration = Duration::from_secs(30);
-    /// A part has to be received within that time, and a second more for each so many bytes. Chunk files are asked for
-    /// again after their own deadline.
-    const LEAST_BYTES_PER_SECOND: u64 = 32 << 10;
-    /// Connections that are kept open to one server, and to all.
+    /// Connections that are kept open to one server, and to all, and for how long: some servers close them after 5 s.
     const IDLE_CONNECTIONS: [usize; 2] = [8, 32];
+    const IDLE: Duration = Duration::from_secs(4);
+    /// Most bytes that are received of the text of an answer without bytes of the file, so that its connection stays open.
+    const TEXT: u64 = 64 << 10;
 
     /// The connections to servers; clones share them.
     #[derive(Debug, Clone)]
@@ -67,12 +68,15 @@ mod native {
             // The verifier of Android needs a handle of the app's Java side.
             let roots = if cfg!(target_os = "android") { RootCerts::WebPki } else { RootCerts::PlatformVerifier };
             let [of_server, of_all] = IDLE_CONNECTIONS;
+            // All settings are those of the agent: one that is set for a request reads the certificates of the system again.
             let config = Agent::config_builder()
                 .http_status_as_error(false)
                 .user_agent(concat!(env!("CARGO_PKG_NAME"), "/", env!("CARGO_PKG_VERSION")))
                 .tls_config(TlsConfig::builder().root_certs(roots).build())
                 .timeout_connect(Some(PATIENCE))
                 .timeout_recv_response(Some(PATIENCE))
+                .timeout_per_read(Some(PATIENCE))
+                .max_idle_age(IDLE)
                 .max_idle_connections_per_host(of_server)
                 .max_idle_connections(of_all);
             Self(config.build().new_agent())
@@ -98,13 +102,19 @@ mod native {
 
     fn asked(agent: &Agent, request: &Request) -> Result<Response, ureq::Error> {
         let Request { url, position, count } = request;
-        // Parts of a compressed answer are not parts of the file.
-        let mut asking = agent.get(url).header(ACCEPT_ENCODING, "identity");
-        if let Some(range) = request.range() {
-            asking = asking.header(RANGE, range);
-        }
-        let patience = count.map(|count| PATIENCE + Duration::from_secs(count / LEAST_BYTES_PER_SECOND));
-        let answer = asking.config().timeout_global(patience).build().call()?;
+        let ask = || {
+            // Parts of a compressed answer are not parts of the file.
+            let asking = agent.get(url).header(ACCEPT_ENCODING, "identity");
+            match request.range() {
+                Some(range) => asking.header(RANGE, range).call(),
+                None => asking.call(),
+            }
+        };
+        let answer = match ask() {
+            // The server has closed a connection that was kept open.
+            Err(ureq::Error::Io(error)) if is_closed(error.kind()) => ask(),
+            answer => answer,
+        }?;
         let status = answer.status();
         let content_range = answer.headers().get(CONTENT_RANGE).and_then(|value| value.to_str().ok());
         Ok(Response {
@@ -114,9 +124,18 @@ mod native {
             bytes: match status.as_u16() {
                 206 => received(answer.into_body(), count.unwrap_or(u64::MAX))?,
                 200 if *position == 0 => received(answer.into_body(), u64::MAX)?,
-                _ => Vec::new(),
+                _ => {
+                    // What the text says, and whether it arrives, is of no use.
+                    let _ = copy(&mut answer.into_body().into_reader().take(TEXT), &mut sink());
+                    Vec::new()
+                }
             },
         })
+    }
+
+    fn is_closed(kind: ErrorKind) -> bool {
+        use ErrorKind::{BrokenPipe, ConnectionAborted, ConnectionReset, UnexpectedEof};
+        matches!(kind, BrokenPipe | ConnectionAborted | ConnectionReset | UnexpectedEof)
     }
 
     /// Returns the beginning of a body, up to `most` bytes.
