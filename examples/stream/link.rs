@@ -102,7 +102,8 @@ impl Link {
         &self.quality
     }
 
-    /// Stops the link for a while, and slows it down, as far as its quality says so. Of each request, up to 64 KiB arrive before.
+    /// Stops the link for a while, and slows it down, as far as its quality says so. Of each request, up to `TURN` bytes
+    /// arrive before.
     pub fn disturb(&self) {
         let (mut traffic, now) = (self.lock(), Instant::now());
         traffic.busy = Some(traffic.busy.map_or(now, |busy| busy.max(now)) + self.quality.outage);

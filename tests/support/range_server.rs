@@ -1,7 +1,7 @@
 //! A server of one file, with faults.
 //!
-//! In: the bytes of a file, whether parts of it are sent, and which requests fail; over TLS or not. Out: an address; the
-//! certificate of the server; what has been asked for, through how many connections.
+//! In: the bytes of a file, whether parts of it are sent, and which requests fail; over TLS or not. Out: an address;
+//! the certificate of the server; what has been asked for, through how many connections.
 
 use crate::support::byte_range::{parse_range, part_of};
 use rcgen::{CertifiedKey, generate_simple_self_signed};
@@ -93,10 +93,9 @@ fn locked(seen: &Mutex<Seen>) -> MutexGuard<'_, Seen> {
 
 /// Answers the requests of a connection until the client ends it.
 fn answer_all(stream: impl Read + Write, file: &[u8], answers: Answers, seen: &Mutex<Seen>) {
-    let mut reader = BufReader::new(stream);
-    let mut requests = 0;
-    while answer(&mut reader, file, answers, seen, requests == 0).is_some() {
-        requests += 1;
+    let (mut reader, mut is_first) = (BufReader::new(stream), true);
+    while answer(&mut reader, file, answers, seen, is_first).is_some() {
+        is_first = false;
     }
 }
 

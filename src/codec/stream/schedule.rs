@@ -116,11 +116,10 @@ impl StreamSchedule {
     ///
     /// A file is fetched if a player reaches it within [`StreamLimits::ahead`] seconds. If the next file does not find
     /// room, those after it wait, too, except for a file that is larger than all memory on the GPU, which is left out.
-    /// While a file of more than [`StreamLimits::long_bytes`] is on its way, other such files wait, unless they are of layer
-    /// 0 and drawn now; shorter ones do not wait.
-    /// Requests that no player needs any more are given up, so that nothing waits for them after a jump in time. Those
-    /// that have taken 30 s, and a second more for each 32 KiB of the file, are given up and count as
-    /// [failed](Self::failed).
+    /// While a file of more than [`StreamLimits::long_bytes`] is on its way, other such files wait, unless they are of
+    /// layer 0 and drawn now; shorter ones do not wait. Requests that no player needs any more are given up, so that
+    /// nothing waits for them after a jump in time. Those that have taken 30 s, and a second more for each 32 KiB of the
+    /// file, are given up and count as [failed](Self::failed).
     pub fn plan(&mut self, now: f64, heads: &[Playhead], limits: &StreamLimits) -> StreamPlan {
         self.pass_time(now);
         let delays = self.delays.map(|delay| delay * limits.seconds_of_layer());
@@ -308,8 +307,8 @@ impl StreamSchedule {
         self.ledger.requested().iter().any(|file| self.is_long(*file, limits))
     }
 
-    /// Returns the files that may be fetched, the most urgent first: of long ones the first of each player, while one is on
-    /// its way only if it is of layer 0 and drawn now. A file that several players need may occur more than once.
+    /// Returns the files that may be fetched, the most urgent first: of long ones the first of each player, while one is
+    /// on its way only if it is of layer 0 and drawn now. A file that several players need may occur more than once.
     fn candidates(&self, demand: &Demand, limits: &StreamLimits) -> BTreeSet<Urgency> {
         let count = limits.requests.saturating_sub(self.requested());
         if count == 0 {

@@ -50,13 +50,13 @@ mod native {
     use ureq::tls::{RootCerts, TlsConfig};
     use ureq::{Agent, Body};
 
-    /// A server has to accept a connection, to begin an answer, and to send each next piece of it within this time. Chunk
-    /// files are asked for again after their own deadline.
+    /// A server has to accept a connection, to begin an answer, and to send each next piece of it within this time.
+    /// Chunk files are asked for again after their own deadline.
     const PATIENCE: Duration = Duration::from_secs(30);
     /// Connections that are kept open to one server, and to all, and for how long: some servers close them after 5 s.
     const IDLE_CONNECTIONS: [usize; 2] = [8, 32];
     const IDLE: Duration = Duration::from_secs(4);
-    /// Most bytes that are received of the text of an answer without bytes of the file, so that its connection stays open.
+    /// Most bytes that are received of an answer without bytes of the file, so that its connection stays open.
     const TEXT: u64 = 64 << 10;
 
     /// The connections to servers; clones share them.
@@ -68,7 +68,7 @@ mod native {
             // The verifier of Android needs a handle of the app's Java side.
             let roots = if cfg!(target_os = "android") { RootCerts::WebPki } else { RootCerts::PlatformVerifier };
             let [of_server, of_all] = IDLE_CONNECTIONS;
-            // All settings are those of the agent: one that is set for a request reads the certificates of the system again.
+            // A setting of one request would read the certificates of the system again.
             let config = Agent::config_builder()
                 .http_status_as_error(false)
                 .user_agent(concat!(env!("CARGO_PKG_NAME"), "/", env!("CARGO_PKG_VERSION")))
@@ -93,7 +93,7 @@ mod native {
             let (agent, own) = (self.0.clone(), done.clone());
             let spawned = thread::Builder::new()
                 .name("HTTP request".to_owned())
-                .spawn(move || own(asked(&agent, &request).map_err(ureq::Error::into_io)));
+                .spawn(move || own(asked(&agent, &request).map_err(|error| told(error.into_io()))));
             if let Err(error) = spawned {
                 done(Err(error));
             }
@@ -131,6 +131,17 @@ mod native {
                 }
             },
         })
+    }
+
+    /// Returns the same error, with the remedy for a server that is not trusted.
+    fn told(error: Error) -> Error {
+        match error.to_string() {
+            text if text.contains("certificate") => {
+                let remedy = "the certificates of the system have to include that of the server's issuer";
+                Error::new(error.kind(), format!("{text}: {remedy}"))
+            }
+            _ => error,
+        }
     }
 
     fn is_closed(kind: ErrorKind) -> bool {
