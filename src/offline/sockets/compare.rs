@@ -6,10 +6,10 @@
 //!
 //! A point is compared while it is there: from the gap in its track before the start to the gap after it.
 
+use super::cloud::Cloud;
 use super::error::SocketError;
 use super::follow::{Followed, Placement, follow_within};
 use super::known_point::KnownPoint;
-use super::neighbors::Cloud;
 use crate::offline::work::Progress;
 use crate::scene::GaussianScene;
 use glam::Vec3;

@@ -22,7 +22,7 @@ pub enum SocketError {
         /// The last time of the capture, timestamp units.
         last: f32,
     },
-    /// The point is in the air, or too few Gaussians that agree are visible near it.
+    /// The point is in the air, or too few solid Gaussians are visible near it.
     #[error(
         "nothing that can be followed is visible within {distance} units of the point at the time {time}: place it on \
          what it is to follow, at a time at which that is visible"
@@ -46,12 +46,6 @@ pub enum SocketError {
         /// The last time of the capture, timestamp units.
         last: f32,
     },
-    /// The capture is a sequence of stills.
-    #[error(
-        "its Gaussians come and go and none of them moves, as in a sequence of stills, so that there is no motion to \
-         follow"
-    )]
-    Still,
     /// A Gaussian cannot be drawn.
     #[error("{0}")]
     Gaussian(#[from] InvalidGaussian),

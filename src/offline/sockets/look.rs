@@ -1,13 +1,12 @@
 //! What a point looks like: the colors around it.
 //!
 //! In: the colors of the Gaussians that are drawn around a point, each with its weight, at the time of the placement
-//! and at another time. Out: how much of the first is there at the other time ([`Look::share`]). What moves fast is
-//! often trained as Gaussians that live for a moment and do not move: their velocities say that it stays, and the look
-//! says that it has gone.
+//! and at another time. Out: how much of the first is there at the other time ([`Look::share`]). What is around a point
+//! may go away while something else is drawn there: then the colors differ.
 
 use glam::Vec3;
 
-/// The difference of two colors that are nearly alike, of 1 between black and white.
+/// The distance of two colors (red, green and blue from 0 to 1) that are nearly alike.
 const ALIKE: f32 = 0.15;
 
 /// The colors around a point.

@@ -6,22 +6,28 @@
 //!
 //! | file | subject |
 //! |---|---|
-//! | `neighbors` | the Gaussians that are drawn near a point at a time |
-//! | `motion` | the rigid motion that the velocities of neighbors agree on |
+//! | `cloud` | the Gaussians of a capture that can be followed |
+//! | `moment` | those that are drawn at a time, by place |
+//! | `graph` | a deformation graph of what is around a point, which moves as rigidly as it can |
+//! | `registration` | how what was drawn at the start is pulled to what is drawn at another time |
+//! | `shape` | graph and registration together: what is around a point, moved from time to time |
 //! | `look` | the colors around a point, which tell whether what it was placed on is still there |
-//! | `follow` | steps along these motions, over the whole time of a capture |
+//! | `follow` | the track of a point over the whole time of a capture, and the ways back |
 //! | `known_point` | points of a scene whose tracks are known, on disk |
 //! | `compare` | how far from such tracks points are that are followed |
 
+mod cloud;
 mod compare;
 mod error;
 #[cfg(test)]
 mod fixture;
 mod follow;
+mod graph;
 mod known_point;
 mod look;
-mod motion;
-mod neighbors;
+mod moment;
+mod registration;
+mod shape;
 
 pub use compare::{Compared, Comparison, compare};
 pub use error::SocketError;

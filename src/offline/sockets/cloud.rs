@@ -1,18 +1,17 @@
-//! The Gaussians that are drawn near a point at a time.
+//! The Gaussians of a capture that can be followed.
 //!
-//! In: the Gaussians of a capture, with its temporal filter; a point and a time. Out: the nearest [`Neighbor`]s,
-//! weighted by their opacity at that time and by their distance; the colors around the point.
+//! In: a capture, with its temporal filter; a time, a box or a point with a radius. Out: the Gaussians that are drawn
+//! in the box at the time ([`Moment`]); whether the point is on one of them; the colors around it.
 
 use super::look::Colored;
-use super::motion::Neighbor;
+use super::moment::{Drawn, Moment};
 use crate::codec::import::columns::SH_C0;
 use crate::gaussian::{Gaussian, Harmonics, InvalidGaussian, lifespan_reach};
 use crate::scene::{Bounds, Form, GaussianScene, SceneForm, TrainedWith};
 use glam::{DVec3, Mat3, Vec3};
 use rayon::prelude::*;
+use std::collections::HashMap;
 
-/// Number of neighbors: enough that the noise of single velocities averages out, few enough to be of one part.
-const COUNT: usize = 48;
 /// Smallest opacity at the time at which a Gaussian counts: fainter ones are haze or the remains of pruning.
 const FAINTEST: f32 = 0.02;
 
@@ -26,8 +25,6 @@ pub(super) struct Cloud {
     pub size: f64,
     /// The length of the time interval, timestamp units.
     pub span: f64,
-    /// Whether it is a sequence of stills: Gaussians that come and go, of which none moves.
-    pub is_still: bool,
 }
 
 /// A Gaussian, and the times between which it is drawn.
@@ -36,14 +33,6 @@ struct Piece {
     /// Its color, independent of direction and time, 0 to 1.
     color: Vec3,
     drawn: [f32; 2],
-}
-
-/// The Gaussians near a point.
-pub(super) struct Near {
-    /// The nearest first.
-    pub neighbors: Vec<Neighbor>,
-    /// The distance of the farthest of them, capture units.
-    pub radius: f64,
 }
 
 impl Cloud {
@@ -68,50 +57,28 @@ impl Cloud {
         let pieces: Vec<Piece> = gaussians.iter().enumerate().filter_map(piece).collect();
         let core = Bounds::core(pieces.iter().map(|piece| piece.gaussian));
         let size = core.map_or(0.0, |core| 2.0 * f64::from(core.radius()));
-        let moves = |piece: &Piece| piece.gaussian.velocity != [0.0; 3];
-        let is_still =
-            !pieces.iter().any(moves) && pieces.iter().any(|piece| piece.drawn.iter().all(|t| t.is_finite()));
         let span = f64::from(time_interval[1]) - f64::from(time_interval[0]);
-        Ok(Self { pieces, size, span, is_still })
+        Ok(Self { pieces, size, span })
     }
 
-    /// Returns the nearest Gaussians that are drawn at `time` (timestamp units) within `reach` (capture units) of a
-    /// point in capture space.
-    pub(super) fn near(&self, place: DVec3, time: f64, reach: f64) -> Near {
-        let (at, now, limit) = (place.as_vec3(), time as f32, (reach * reach) as f32);
-        let distance = |piece: &Piece| {
-            let [first, last] = piece.drawn;
-            if !(first..=last).contains(&now) {
+    /// Returns the Gaussians that are drawn at `time` (timestamp units), of those whose means are in a box (capture
+    /// space) if there is one, and of those in a cubic cell of side `cell` (capture units) the most opaque.
+    pub(super) fn moment(&self, time: f64, bounds: Option<[DVec3; 2]>, cell: Option<f64>) -> Moment {
+        let now = time as f32;
+        let drawn = |piece: &Piece| {
+            let Piece { gaussian, color, drawn: [first, last] } = piece;
+            if !(*first..=*last).contains(&now) {
                 return None;
             }
-            let distance = piece.gaussian.mean_at(now).distance_squared(at);
-            (distance <= limit && piece.gaussian.opacity * piece.gaussian.marginal(now) > FAINTEST).then_some(distance)
-        };
-        let pieces = self.pieces.par_iter().enumerate();
-        let mut found: Vec<(f32, usize)> =
-            pieces.filter_map(|(index, piece)| Some((distance(piece)?, index))).collect();
-        let nearer = |a: &(f32, usize), b: &(f32, usize)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
-        if found.len() > COUNT {
-            found.select_nth_unstable_by(COUNT, nearer);
-            found.truncate(COUNT);
-        }
-        found.sort_unstable_by(nearer);
-        let radius = found.last().map_or(0.0, |(distance, _)| f64::from(*distance).sqrt());
-        let neighbors = found.iter().filter_map(|(distance, index)| {
-            let Piece { gaussian, .. } = self.pieces.get(*index)?;
-            let spread = (0.5 * radius).max(f64::MIN_POSITIVE.sqrt().sqrt());
-            let near = (-0.5 * f64::from(*distance) / (spread * spread)).exp();
-            // The integral of the marginal; at most the whole time.
-            let life = (f64::from(gaussian.sigma_t) * std::f64::consts::TAU.sqrt()).min(self.span);
-            Some(Neighbor {
-                mean: Vec3::from(gaussian.mean).as_dvec3(),
-                mean_t: f64::from(gaussian.mean_t),
-                velocity: Vec3::from(gaussian.velocity).as_dvec3(),
-                life,
-                weight: f64::from(gaussian.opacity * gaussian.marginal(now)) * near,
+            let (mean, opacity) = (gaussian.mean_at(now).as_dvec3(), gaussian.opacity * gaussian.marginal(now));
+            let is_inside = |[low, high]: [DVec3; 2]| mean.cmpge(low).all() && mean.cmple(high).all();
+            (opacity > FAINTEST && mean.is_finite() && bounds.is_none_or(is_inside)).then(|| {
+                let covariance = matrix(gaussian, 0.0).as_dmat3();
+                Drawn { mean, opacity: opacity.into(), covariance, color: *color }
             })
-        });
-        Near { neighbors: neighbors.collect(), radius }
+        };
+        let drawn = self.pieces.par_iter().filter_map(drawn).collect();
+        Moment::of(if let Some(cell) = cell { thinned(drawn, cell) } else { drawn })
     }
 
     /// Returns whether a point in capture space is on a Gaussian that is drawn at `time` (timestamp units), or about
@@ -122,10 +89,7 @@ impl Cloud {
         self.pieces.par_iter().any(|Piece { gaussian, drawn: [first, last], .. }| {
             let is_drawn = (*first..=*last).contains(&now) && gaussian.opacity * gaussian.marginal(now) > FAINTEST;
             let offset = gaussian.mean_at(now) - at;
-            let [xx, xy, xz, yy, yz, zz] = gaussian.covariance;
-            let columns = [[xx + wider, xy, xz], [xy, yy + wider, yz], [xz, yz, zz + wider]];
-            let covariance = Mat3::from_cols_array_2d(&columns);
-            is_drawn && offset.dot(covariance.inverse() * offset) <= SEEN * SEEN
+            is_drawn && offset.dot(matrix(gaussian, wider).inverse() * offset) <= SEEN * SEEN
         })
     }
 
@@ -146,6 +110,25 @@ impl Cloud {
         };
         self.pieces.par_iter().filter_map(colored).collect()
     }
+}
+
+/// Returns the covariance of a Gaussian, wider by this variance in all directions.
+fn matrix(gaussian: &Gaussian, wider: f32) -> Mat3 {
+    let [xx, xy, xz, yy, yz, zz] = gaussian.covariance;
+    Mat3::from_cols_array_2d(&[[xx + wider, xy, xz], [xy, yy + wider, yz], [xz, yz, zz + wider]])
+}
+
+/// Returns the most opaque Gaussian of each cell, in their order.
+fn thinned(mut drawn: Vec<Drawn>, cell: f64) -> Vec<Drawn> {
+    let at = |one: &Drawn| ((one.mean / cell).floor() + DVec3::ZERO).to_array().map(f64::to_bits);
+    let mut best: HashMap<[u64; 3], f64> = HashMap::new();
+    for one in &drawn {
+        let opacity = best.entry(at(one)).or_insert(one.opacity);
+        *opacity = opacity.max(one.opacity);
+    }
+    // Of equal ones the first.
+    drawn.retain(|one| best.get(&at(one)).is_some_and(|best| one.opacity >= *best) && best.remove(&at(one)).is_some());
+    drawn
 }
 
 /// Returns the color of each Gaussian, independent of direction and time, 0 to 1.

@@ -1,0 +1,161 @@
+//! The shape around a point, as it moves.
+//!
+//! In: a capture, a point at a time. Out: the [`Shape`] around it, which is moved from time to time: it stays as rigid
+//! as it can ([`Graph`]) and is pulled to what is drawn ([`Sources`]); where the point is on it, and how sure that is.
+
+use super::cloud::Cloud;
+use super::graph::{Graph, Pose, Skinned};
+use super::moment::Moment;
+use super::registration::{Candidates, ROUNDS, SEARCH, Sources, strength};
+use glam::{DQuat, DVec3};
+use std::sync::Arc;
+
+/// Smallest and largest distance between nodes, as parts of the size of the capture.
+const SPACING: [f64; 2] = [0.0085, 0.1];
+/// In between it is the median, over so many Gaussians around the point, of the distance to their fourth neighbor.
+const SAMPLE: usize = 64;
+const NEIGHBOR: usize = 4;
+/// Smallest opacity at the start of a Gaussian that is part of the shape.
+pub(super) const SOLID: f64 = 0.1;
+/// How strongly the shape is kept, against a pull of 1 at each node.
+const STIFFNESS: f64 = 0.1;
+/// The part of the way of the step before that is expected again.
+const INERTIA: f64 = 0.9;
+/// How strongly nodes stay where they are expected: it decides for nodes that nothing else pulls.
+const HOLD: f64 = 1e-3;
+/// Distance around the shape in which Gaussians are drawn to which it is pulled, in spacings.
+const MARGIN: f64 = 5.0;
+/// Longest way of a node around the point in one step from where it was expected, and the distance within which nodes
+/// are around it, in spacings.
+const LONGEST_WAY: f64 = 1.5;
+const VICINITY: f64 = 5.0;
+/// Side of the cells of which each has one Gaussian to which the shape is pulled, in spacings.
+const CELL: f64 = 0.3;
+/// Least part of the pulls around the point at the start that must still be there.
+const LEAST_PULL: f64 = 0.1;
+/// Error of a point for each unit of misfit of the edges around it: the root of the mean square over the cloths of the
+/// film of the island (docs/benchmarks.md, "Sockets").
+const ERROR_OF_MISFIT: f64 = 5.0;
+
+/// What is around a point.
+#[derive(Clone)]
+pub(super) struct Shape<'a> {
+    cloud: &'a Cloud,
+    graph: Arc<Graph>,
+    sources: Arc<Sources>,
+    point: Skinned,
+    /// Distance within which nodes and sources are around the point at rest, capture units.
+    vicinity: f64,
+    pose: Pose,
+    /// How strongly sources around the point are pulled.
+    pull: f64,
+    /// The velocity of each node in the step before, capture units per timestamp unit.
+    velocities: Vec<DVec3>,
+    /// Timestamp units.
+    time: f64,
+}
+
+impl<'a> Shape<'a> {
+    /// Returns the shape around a point (capture space) at a time (timestamp units); `None` if too little that is solid
+    /// is drawn there, or the capture has no size.
+    pub(super) fn around(cloud: &'a Cloud, point: DVec3, time: f64) -> Option<Self> {
+        let start = cloud.moment(time, None, None);
+        let [least, most] = SPACING.map(|part| part * cloud.size);
+        let spacing = spacing(&start, point)?.clamp(least, most);
+        if spacing <= 0.0 {
+            return None;
+        }
+        let solid: Vec<DVec3> = start.drawn.iter().filter(|one| one.opacity > SOLID).map(|one| one.mean).collect();
+        let graph = Graph::around(point, &solid, spacing)?;
+        let vicinity = graph.distance(point) + VICINITY * spacing;
+        let pose = graph.at_rest();
+        graph.misfit_around(&pose, point, vicinity)?;
+        let start = cloud.moment(time, Some(bounds(&pose, spacing)), Some(CELL * spacing));
+        let sources = Sources::on(&graph, &start);
+        let pull = sources.pull_around(point, vicinity);
+        let (point, velocities) = (graph.skin(point), vec![DVec3::ZERO; graph.rest.len()]);
+        let (graph, sources) = (Arc::new(graph), Arc::new(sources));
+        Some(Self { cloud, graph, sources, point, vicinity, pose, pull, velocities, time })
+    }
+
+    /// Moves the shape to a time. Returns whether it has moved: it does not if nodes around the point would be far from
+    /// where they are expected, unless that is `forced`, and not to places that are no numbers.
+    pub(super) fn advance(&mut self, time: f64, forced: bool) -> bool {
+        let Self { cloud, graph, sources, .. } = &*self;
+        let duration = time - self.time;
+        let moved = self.pose.places.iter().zip(&self.velocities);
+        let expected: Vec<DVec3> = moved.map(|(place, velocity)| place + velocity * (INERTIA * duration)).collect();
+        let mut pose = Pose { places: expected.clone(), ..self.pose.clone() };
+        let bounds = bounds(&pose, graph.spacing);
+        let moment = cloud.moment(time, Some(bounds), Some(CELL * graph.spacing));
+        let mut candidates = Candidates::default();
+        let mut pull = 0.0;
+        for round in 0..ROUNDS {
+            if !pose.places.iter().all(|place| place.is_finite()) {
+                return false;
+            }
+            graph.turn(&mut pose);
+            if round.is_multiple_of(SEARCH) {
+                candidates = sources.candidates(graph, &pose, &moment);
+            }
+            let pulls = sources.pulls(graph, &pose, &candidates, round);
+            pull = strength(&pulls, self.point.rest, self.vicinity);
+            pose.places = graph.balanced(&pose, &pulls, STIFFNESS, &expected, HOLD);
+        }
+        graph.turn(&mut pose);
+        let longest = LONGEST_WAY * graph.spacing;
+        let is_off = |node: usize| {
+            let is_near = graph.rest[node].distance(self.point.rest) <= self.vicinity;
+            is_near && pose.places[node].distance(expected[node]) > longest
+        };
+        let is_number = pose.places.iter().all(|place| place.is_finite());
+        if !is_number || !forced && (0..graph.rest.len()).any(is_off) {
+            return false;
+        }
+        let moved = pose.places.iter().zip(&self.pose.places);
+        self.velocities = moved.map(|(after, before)| (after - before) / duration).collect();
+        (self.pose, self.pull, self.time) = (pose, pull, time);
+        true
+    }
+
+    /// Returns whether what is around the point is still pulled to something.
+    pub(super) fn is_held(&self) -> bool {
+        self.pull >= LEAST_PULL * self.sources.pull_around(self.point.rest, self.vicinity)
+    }
+
+    /// Returns where the point is, capture space.
+    pub(super) fn place(&self) -> DVec3 {
+        self.point.place(&self.graph, &self.pose)
+    }
+
+    /// Returns how the point is turned, from the start.
+    pub(super) fn rotation(&self) -> DQuat {
+        self.point.rotation(&self.pose)
+    }
+
+    /// Returns an estimate of the error of the place, capture units: what bends and stretches is followed less surely.
+    pub(super) fn error(&self) -> f64 {
+        let Self { graph, pose, point, vicinity, .. } = self;
+        ERROR_OF_MISFIT * graph.misfit_around(pose, point.rest, *vicinity).unwrap_or(0.0)
+    }
+}
+
+/// Returns the median over the Gaussians around a point of the distance to one of their neighbors, capture units;
+/// `None` without Gaussians.
+fn spacing(start: &Moment, point: DVec3) -> Option<f64> {
+    let neighbor = |index: usize| {
+        let (_, square) = start.nearest(start.drawn[index].mean).take(NEIGHBOR + 1).last()?;
+        Some(square.sqrt())
+    };
+    let mut distances: Vec<f64> = start.nearest(point).take(SAMPLE).filter_map(|(index, _)| neighbor(index)).collect();
+    distances.sort_by(f64::total_cmp);
+    distances.get(distances.len() / 2).copied()
+}
+
+/// Returns the box around a pose, with the Gaussians to which it can be pulled.
+fn bounds(pose: &Pose, spacing: f64) -> [DVec3; 2] {
+    let margin = DVec3::splat(MARGIN * spacing);
+    let low = pose.places.iter().copied().fold(DVec3::INFINITY, DVec3::min);
+    let high = pose.places.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
+    [low - margin, high + margin]
+}
