@@ -148,23 +148,29 @@ fn place(mut commands: Commands, assets: Res<AssetServer>, settings: Res<Setting
 fn collide(
     mut commands: Commands,
     mut changes: MessageReader<CaptureColliderChanged>,
-    colliders: Query<(&CaptureCollider, &ColliderState)>,
+    mut colliders: Query<(&CaptureCollider, &ColliderState, Option<&mut Collider>)>,
     mut prepared: ResMut<Prepared>,
     mut exchanged: ResMut<Exchanged>,
 ) {
     for change in changes.read() {
         exchanged.0 = true;
-        let Ok((part, state)) = colliders.get(change.entity) else { continue };
+        let Ok((part, state, present)) = colliders.get_mut(change.entity) else { continue };
         if let Some(all) = state.colliders() {
             prepared.prepare(all);
         }
         let shape = state.mesh().and_then(|_| prepared.shape(*part, state.stretch()));
         let mut entity = commands.entity(change.entity);
-        match shape {
+        match (shape, present) {
+            // A shape that is exchanged in place has its mass found once by Avian, and twice if it is inserted.
+            (Some(shape), Some(mut present)) => present.clone_from(shape),
             // The body begins where the capture stands then: upright.
-            Some(shape) => entity.insert_if_new(RigidBody::Static).insert(shape.clone()),
-            None => entity.remove::<Collider>(),
-        };
+            (Some(shape), None) => {
+                entity.insert_if_new(RigidBody::Static).insert(shape.clone());
+            }
+            (None, _) => {
+                entity.remove::<Collider>();
+            }
+        }
     }
 }
 
