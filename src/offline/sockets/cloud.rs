@@ -1,16 +1,15 @@
 //! The Gaussians of a capture that can be followed.
 //!
 //! In: a capture, with its temporal filter; a time, a box or a point with a radius. Out: the Gaussians that are drawn
-//! in the box at the time ([`Moment`]); whether the point is on one of them; the colors around it.
+//! in the box at the time ([`Drawn`]); whether the point is on one of them; the colors around it.
 
 use super::look::Colored;
-use super::moment::{Drawn, Moment};
+use super::moment::{Drawn, is_inside};
 use crate::codec::import::columns::SH_C0;
 use crate::gaussian::{Gaussian, Harmonics, InvalidGaussian, lifespan_reach};
 use crate::scene::{Bounds, Form, GaussianScene, SceneForm, TrainedWith};
 use glam::{DVec3, Mat3, Vec3};
 use rayon::prelude::*;
-use std::collections::HashMap;
 
 /// Smallest opacity at the time at which a Gaussian counts: fainter ones are haze or the remains of pruning.
 const FAINTEST: f32 = 0.02;
@@ -51,8 +50,9 @@ impl Cloud {
                 None => [f32::NEG_INFINITY, f32::INFINITY],
             };
             let drawn = [first.max(gaussian.mean_t - half), last.min(gaussian.mean_t + half)];
+            let color = colors.get(index).filter(|color| color.is_finite())?.clamp(Vec3::ZERO, Vec3::ONE);
             let is_followed = gaussian.opacity > FAINTEST && gaussian.check().is_ok();
-            is_followed.then_some(Piece { gaussian: *gaussian, color: *colors.get(index)?, drawn })
+            is_followed.then_some(Piece { gaussian: *gaussian, color, drawn })
         };
         let pieces: Vec<Piece> = gaussians.iter().enumerate().filter_map(piece).collect();
         let core = Bounds::core(pieces.iter().map(|piece| piece.gaussian));
@@ -62,8 +62,8 @@ impl Cloud {
     }
 
     /// Returns the Gaussians that are drawn at `time` (timestamp units), of those whose means are in a box (capture
-    /// space) if there is one, and of those in a cubic cell of side `cell` (capture units) the most opaque.
-    pub(super) fn moment(&self, time: f64, bounds: Option<[DVec3; 2]>, cell: Option<f64>) -> Moment {
+    /// space) if there is one.
+    pub(super) fn drawn(&self, time: f64, bounds: Option<[DVec3; 2]>) -> Vec<Drawn> {
         let now = time as f32;
         let drawn = |piece: &Piece| {
             let Piece { gaussian, color, drawn: [first, last] } = piece;
@@ -71,14 +71,15 @@ impl Cloud {
                 return None;
             }
             let (mean, opacity) = (gaussian.mean_at(now).as_dvec3(), gaussian.opacity * gaussian.marginal(now));
-            let is_inside = |[low, high]: [DVec3; 2]| mean.cmpge(low).all() && mean.cmple(high).all();
-            (opacity > FAINTEST && mean.is_finite() && bounds.is_none_or(is_inside)).then(|| {
+            let is_in_box = bounds.is_none_or(|bounds| is_inside(mean, bounds));
+            (opacity > FAINTEST && mean.is_finite() && is_in_box).then(|| {
                 let covariance = matrix(gaussian, 0.0).as_dmat3();
-                Drawn { mean, opacity: opacity.into(), covariance, color: *color }
+                let velocity = Vec3::from(gaussian.velocity).as_dvec3();
+                let duration = f64::from(gaussian.sigma_t).min(self.span);
+                Drawn { mean, opacity: opacity.into(), covariance, color: *color, velocity, duration }
             })
         };
-        let drawn = self.pieces.par_iter().filter_map(drawn).collect();
-        Moment::of(if let Some(cell) = cell { thinned(drawn, cell) } else { drawn })
+        self.pieces.par_iter().filter_map(drawn).collect()
     }
 
     /// Returns whether a point in capture space is on a Gaussian that is drawn at `time` (timestamp units), or about
@@ -118,20 +119,7 @@ fn matrix(gaussian: &Gaussian, wider: f32) -> Mat3 {
     Mat3::from_cols_array_2d(&[[xx + wider, xy, xz], [xy, yy + wider, yz], [xz, yz, zz + wider]])
 }
 
-/// Returns the most opaque Gaussian of each cell, in their order.
-fn thinned(mut drawn: Vec<Drawn>, cell: f64) -> Vec<Drawn> {
-    let at = |one: &Drawn| ((one.mean / cell).floor() + DVec3::ZERO).to_array().map(f64::to_bits);
-    let mut best: HashMap<[u64; 3], f64> = HashMap::new();
-    for one in &drawn {
-        let opacity = best.entry(at(one)).or_insert(one.opacity);
-        *opacity = opacity.max(one.opacity);
-    }
-    // Of equal ones the first.
-    drawn.retain(|one| best.get(&at(one)).is_some_and(|best| one.opacity >= *best) && best.remove(&at(one)).is_some());
-    drawn
-}
-
-/// Returns the color of each Gaussian, independent of direction and time, 0 to 1.
+/// Returns the color of each Gaussian, independent of direction and time, mostly 0 to 1.
 fn colors(scene: &GaussianScene) -> Vec<Vec3> {
     let all = |harmonics: &Harmonics| -> Vec<Vec3> {
         (0..scene.len()).map(|index| Vec3::from_slice(harmonics.of(index)) * SH_C0 + 0.5).collect()

@@ -53,5 +53,10 @@ pub(super) fn gaussian(mean: Vec3, mean_t: f32, velocity: Vec3, sigma_t: f32) ->
 /// Returns a capture of gray Gaussians.
 pub(super) fn scene(gaussians: Vec<Gaussian>) -> GaussianScene {
     let values = vec![0.0; 3 * gaussians.len()];
+    colored(gaussians, values)
+}
+
+/// Returns a capture of Gaussians with these colors, three spherical harmonics of degree 0 each.
+pub(super) fn colored(gaussians: Vec<Gaussian>, values: Vec<f32>) -> GaussianScene {
     RuntimeScene::sliced(gaussians, Harmonics { coefficients: 1, values, ..Harmonics::default() }).into()
 }

@@ -8,6 +8,7 @@
 use super::cloud::Cloud;
 use super::error::SocketError;
 use super::look::Look;
+use super::moment::Moment;
 use super::shape::{SOLID, Shape};
 use crate::offline::work::{Progress, proceed};
 use crate::scene::{GaussianScene, Socket, SocketSample};
@@ -171,9 +172,9 @@ impl<'a> Follower<'a> {
         let (place, time) = (place_of(start), f64::from(start.time));
         let reach = FARTHEST * cloud.size;
         let nothing = |distance: f64| SocketError::NothingThere { distance: distance as f32, time: start.time };
-        let moment = cloud.moment(time, Some([place - reach, place + reach]), None);
+        let moment = Moment::of(cloud.drawn(time, Some([place - reach, place + reach])));
         let near = || moment.nearest(place).take_while(|(_, square)| *square <= reach * reach);
-        let is_solid = |(index, _): &(usize, f64)| moment.drawn[*index].opacity > SOLID;
+        let is_solid = |(index, _): &(usize, f64)| moment.all[*index].opacity > SOLID;
         if cloud.size <= 0.0 || near().filter(is_solid).take(FEWEST).count() < FEWEST {
             return Err(nothing(reach));
         }
@@ -181,9 +182,9 @@ impl<'a> Follower<'a> {
         let spread = 0.25 * near.last().map_or(0.0, |(_, square)| square.max(f64::MIN_POSITIVE.sqrt()));
         let (mut sum, mut towards, mut squares) = (0.0, DVec3::ZERO, 0.0);
         for &(index, square) in &near {
-            let weight = moment.drawn[index].opacity * (-0.5 * square / spread).exp();
+            let weight = moment.all[index].opacity * (-0.5 * square / spread).exp();
             sum += weight;
-            towards += (moment.drawn[index].mean - place).normalize_or_zero() * weight;
+            towards += (moment.all[index].mean - place).normalize_or_zero() * weight;
             squares += square * weight;
         }
         let nearest = NEAREST * cloud.size;
@@ -309,12 +310,11 @@ fn sampled(walked: &[Step], times: &[f32]) -> Vec<SocketSample> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::fixture::{TURN, body, gaussian, place, scene};
+    use super::super::fixture::{TURN, body, colored, gaussian, place, scene};
     use super::*;
-    use crate::gaussian::{Gaussian, Harmonics};
+    use crate::gaussian::Gaussian;
     use crate::offline::work::NoProgress;
     use crate::offline::work::progress::InterruptedProgress;
-    use crate::scene::RuntimeScene;
     use crate::scene::random::Random;
 
     fn placement(point: DVec3, time: f32, samples: usize) -> Placement {
@@ -384,8 +384,7 @@ mod tests {
             });
             values.extend(if column % 6 < 3 { [1.5, 1.2, -1.0] } else { [-1.0, -1.0, 1.0] });
         }
-        let harmonics = Harmonics { coefficients: 1, values, ..Harmonics::default() };
-        let sheet = GaussianScene::from(RuntimeScene::sliced(gaussians, harmonics));
+        let sheet = colored(gaussians, values);
         let start = Vec3::new(0.82, 0.22, 0.0) + slide * 0.5;
         let placement = Placement { name: "patch".into(), position: start.to_array(), time: 0.5, samples: 21 };
         let Followed { socket, lost, size, .. } = followed(&sheet, &placement).expect("it is there");
@@ -429,8 +428,7 @@ mod tests {
         }
         let yellow = |index: usize| if index < room { [0.0; 3] } else { [1.5, 1.2, -1.0] };
         let values: Vec<f32> = (0..gaussians.len()).flat_map(yellow).collect();
-        let harmonics = Harmonics { coefficients: 1, values, ..Harmonics::default() };
-        let jumps = GaussianScene::from(RuntimeScene::sliced(gaussians, harmonics));
+        let jumps = colored(gaussians, values);
         let position = (Vec3::X * -1.0).to_array();
         let placement = Placement { name: "ball".into(), position, time: 0.0, samples: 61 };
         let found = followed(&jumps, &placement).expect("it is there");

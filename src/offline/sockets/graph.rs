@@ -63,7 +63,7 @@ pub(super) struct Skinned {
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Pull {
     pub force: DVec3,
-    pub stiffness: DMat3,
+    pub stiffness: f64,
 }
 
 impl Graph {
@@ -156,15 +156,14 @@ impl Graph {
             .iter()
             .map(|edges| stiffness * edges.iter().map(|(_, weight)| weight).sum::<f64>() + hold)
             .collect();
-        let mut diagonal: Vec<DMat3> =
-            weights.iter().map(|weight| DMat3::from_diagonal(DVec3::splat(*weight))).collect();
+        let mut diagonal = weights.clone();
         for (point, pull) in pulls {
             for &(node, weight) in &point.carriers {
                 forces[node] += pull.force * weight;
                 diagonal[node] += pull.stiffness * (weight * weight);
             }
         }
-        let inverse: Vec<DMat3> = diagonal.iter().map(DMat3::inverse).collect();
+        let inverse: Vec<f64> = diagonal.iter().map(|weight| weight.recip()).collect();
         let times = |ways: &[DVec3]| -> Vec<DVec3> {
             let of = |node: usize| {
                 let others = self.edges[node].iter().map(|&(other, weight)| ways[other] * weight);
@@ -173,7 +172,7 @@ impl Graph {
             let mut answer: Vec<DVec3> = nodes.clone().map(of).collect();
             for (point, pull) in pulls {
                 let way: DVec3 = point.carriers.iter().map(|&(node, weight)| ways[node] * weight).sum();
-                let against = pull.stiffness * way;
+                let against = way * pull.stiffness;
                 point.carriers.iter().for_each(|&(node, weight)| answer[node] += against * weight);
             }
             answer
@@ -287,15 +286,11 @@ fn rotation(matrix: &DMat3, mut near: DQuat) -> DQuat {
     near
 }
 
-/// Returns the ways for which `times` returns about these forces, by conjugate gradients with the inverses of the
-/// diagonal blocks as preconditioner.
-fn conjugate_gradients(
-    mut forces: Vec<DVec3>,
-    inverse: &[DMat3],
-    times: impl Fn(&[DVec3]) -> Vec<DVec3>,
-) -> Vec<DVec3> {
+/// Returns the ways for which `times` returns about these forces, by conjugate gradients with the inverse of the
+/// diagonal as preconditioner.
+fn conjugate_gradients(mut forces: Vec<DVec3>, inverse: &[f64], times: impl Fn(&[DVec3]) -> Vec<DVec3>) -> Vec<DVec3> {
     let dot = |a: &[DVec3], b: &[DVec3]| a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum::<f64>();
-    let conditioned = |forces: &[DVec3]| -> Vec<DVec3> { inverse.iter().zip(forces).map(|(i, f)| *i * *f).collect() };
+    let conditioned = |forces: &[DVec3]| -> Vec<DVec3> { inverse.iter().zip(forces).map(|(i, f)| *f * *i).collect() };
     let mut ways = vec![DVec3::ZERO; forces.len()];
     let mut direction = conditioned(&forces);
     let mut rest = dot(&forces, &direction);
@@ -363,7 +358,7 @@ mod tests {
             graph.turn(&mut pose);
             let pull = |point| {
                 let force = moved(Skinned::clone(point).rest) - point.place(&graph, &pose);
-                Pull { force, stiffness: DMat3::IDENTITY }
+                Pull { force, stiffness: 1.0 }
             };
             let pulls: Vec<(&Skinned, Pull)> = pulled.iter().map(|point| (point, pull(point))).collect();
             pose.places = graph.balanced(&pose, &pulls, 1.0, &expected, 0.0);

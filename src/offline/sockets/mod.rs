@@ -7,7 +7,9 @@
 //! | file | subject |
 //! |---|---|
 //! | `cloud` | the Gaussians of a capture that can be followed |
-//! | `moment` | those that are drawn at a time, by place |
+//! | `moment` | what is drawn at a time, by place |
+//! | `surface` | the surfaces of what is drawn, as they are seen from all around |
+//! | `means` | the means of Gaussians, of those that move as what is around them |
 //! | `graph` | a deformation graph of what is around a point, which moves as rigidly as it can |
 //! | `registration` | how what was drawn at the start is pulled to what is drawn at another time |
 //! | `shape` | graph and registration together: what is around a point, moved from time to time |
@@ -25,9 +27,11 @@ mod follow;
 mod graph;
 mod known_point;
 mod look;
+mod means;
 mod moment;
 mod registration;
 mod shape;
+mod surface;
 
 pub use compare::{Compared, Comparison, compare};
 pub use error::SocketError;

@@ -1,7 +1,7 @@
-//! The Gaussians that are drawn at a time, by place.
+//! What is there at a time, by place.
 //!
-//! In: the Gaussians, each with its mean and its opacity at the time. Out: a [`Moment`], in which those nearest to a
-//! point are found.
+//! In: the Gaussians that are drawn at a time ([`Drawn`]), or what a shape can be pulled to ([`Feature`]). Out: a
+//! [`Moment`] of either, in which those nearest to a point are found.
 
 use glam::{DMat3, DVec3, Vec3};
 use rstar::RTree;
@@ -18,26 +18,64 @@ pub(super) struct Drawn {
     pub covariance: DMat3,
     /// Its color, independent of direction and time, 0 to 1.
     pub color: Vec3,
+    /// Its velocity, capture units per timestamp unit.
+    pub velocity: DVec3,
+    /// The standard deviation of its marginal, at most the time interval, timestamp units.
+    pub duration: f64,
 }
 
-/// The Gaussians that are drawn at a time.
-pub(super) struct Moment {
-    pub drawn: Vec<Drawn>,
+/// What a shape can be pulled to at a time: a point on a surface, or the mean of a Gaussian.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Feature {
+    /// Capture space.
+    pub place: DVec3,
+    /// How sure it is, 0 to 1.
+    pub weight: f64,
+    /// 0 to 1.
+    pub color: Vec3,
+}
+
+/// What has a place.
+pub(super) trait Placed {
+    /// Capture space.
+    fn place(&self) -> DVec3;
+}
+
+impl Placed for Drawn {
+    fn place(&self) -> DVec3 {
+        self.mean
+    }
+}
+
+impl Placed for Feature {
+    fn place(&self) -> DVec3 {
+        self.place
+    }
+}
+
+/// What is there at a time, in which neighbors are found.
+pub(super) struct Moment<T> {
+    pub all: Vec<T>,
     tree: RTree<Place>,
 }
 
-/// A mean, with the index of its Gaussian.
+/// Returns whether a place is in a box, both in capture space.
+pub(super) fn is_inside(place: DVec3, [low, high]: [DVec3; 2]) -> bool {
+    place.cmpge(low).all() && place.cmple(high).all()
+}
+
+/// A place, with the index of what is there.
 type Place = GeomWithData<[f64; 3], usize>;
 
-impl Moment {
-    pub(super) fn of(drawn: Vec<Drawn>) -> Self {
-        let places = drawn.iter().enumerate().map(|(index, one)| Place::new(one.mean.to_array(), index));
+impl<T: Placed> Moment<T> {
+    /// Returns the moment of these.
+    pub(super) fn of(all: Vec<T>) -> Self {
+        let places = all.iter().enumerate().map(|(index, one)| Place::new(one.place().to_array(), index));
         let tree = RTree::bulk_load(places.collect());
-        Self { drawn, tree }
+        Self { all, tree }
     }
 
-    /// Returns the indices of the Gaussians whose means are nearest to a point, the nearest first, with the squares of
-    /// their distances.
+    /// Returns the indices of those nearest to a point, the nearest first, with the squares of their distances.
     pub(super) fn nearest(&self, place: DVec3) -> impl Iterator<Item = (usize, f64)> {
         let found = self.tree.nearest_neighbor_iter_with_distance_2(&place.to_array());
         found.map(|(place, square)| (place.data, square))

@@ -1,13 +1,17 @@
 //! The shape around a point, as it moves.
 //!
 //! In: a capture, a point at a time. Out: the [`Shape`] around it, which is moved from time to time: it stays as rigid
-//! as it can ([`Graph`]) and is pulled to what is drawn ([`Sources`]); where the point is on it, and how sure that is.
+//! as it can ([`Graph`]) and is pulled ([`Sources`]) to surfaces and means; where the point is on it, and how sure that
+//! is.
 
 use super::cloud::Cloud;
 use super::graph::{Graph, Pose, Skinned};
-use super::moment::Moment;
+use super::means::{Moving, means};
+use super::moment::{Drawn, Feature, Moment};
 use super::registration::{Candidates, ROUNDS, SEARCH, Sources, strength};
+use super::surface::{surface, thinned};
 use glam::{DQuat, DVec3};
+use rstar::RTree;
 use std::sync::Arc;
 
 /// Smallest and largest distance between nodes, as parts of the size of the capture.
@@ -18,23 +22,25 @@ const NEIGHBOR: usize = 4;
 /// Smallest opacity at the start of a Gaussian that is part of the shape.
 pub(super) const SOLID: f64 = 0.1;
 /// How strongly the shape is kept, against a pull of 1 at each node.
-const STIFFNESS: f64 = 0.1;
+const STIFFNESS: f64 = 0.7;
 /// The part of the way of the step before that is expected again.
-const INERTIA: f64 = 0.9;
+const INERTIA: f64 = 0.5;
 /// How strongly nodes stay where they are expected: it decides for nodes that nothing else pulls.
-const HOLD: f64 = 1e-3;
-/// Distance around the shape in which Gaussians are drawn to which it is pulled, in spacings.
+const HOLD: f64 = 0.01;
+/// Distance around the nodes within which features are found, and from the point, in spacings.
 const MARGIN: f64 = 5.0;
+const AROUND: f64 = 40.0;
 /// Longest way of a node around the point in one step from where it was expected, and the distance within which nodes
 /// are around it, in spacings.
 const LONGEST_WAY: f64 = 1.5;
 const VICINITY: f64 = 5.0;
-/// Side of the cells of which each has one Gaussian to which the shape is pulled, in spacings.
-const CELL: f64 = 0.3;
+/// Size of the pixels of the views of surfaces, which is the side of the cells of which each has one mean, too, in
+/// spacings.
+const PIXEL: f64 = 0.4;
 /// Least part of the pulls around the point at the start that must still be there.
 const LEAST_PULL: f64 = 0.1;
 /// Error of a point for each unit of misfit of the edges around it: the root of the mean square over the cloths of the
-/// film of the island (docs/benchmarks.md, "Sockets").
+/// film of the island, found when means alone pulled (docs/benchmarks.md, "Sockets").
 const ERROR_OF_MISFIT: f64 = 5.0;
 
 /// What is around a point.
@@ -49,8 +55,8 @@ pub(super) struct Shape<'a> {
     pose: Pose,
     /// How strongly sources around the point are pulled.
     pull: f64,
-    /// The velocity of each node in the step before, capture units per timestamp unit.
-    velocities: Vec<DVec3>,
+    /// The velocity of each node in the step before, capture units per timestamp unit; `None` before the first one.
+    velocities: Option<Vec<DVec3>>,
     /// Timestamp units.
     time: f64,
 }
@@ -59,35 +65,39 @@ impl<'a> Shape<'a> {
     /// Returns the shape around a point (capture space) at a time (timestamp units); `None` if too little that is solid
     /// is drawn there, or the capture has no size.
     pub(super) fn around(cloud: &'a Cloud, point: DVec3, time: f64) -> Option<Self> {
-        let start = cloud.moment(time, None, None);
+        let start = Moment::of(cloud.drawn(time, None));
         let [least, most] = SPACING.map(|part| part * cloud.size);
         let spacing = spacing(&start, point)?.clamp(least, most);
         if spacing <= 0.0 {
             return None;
         }
-        let solid: Vec<DVec3> = start.drawn.iter().filter(|one| one.opacity > SOLID).map(|one| one.mean).collect();
+        let solid: Vec<DVec3> = start.all.iter().filter(|one| one.opacity > SOLID).map(|one| one.mean).collect();
         let graph = Graph::around(point, &solid, spacing)?;
         let vicinity = graph.distance(point) + VICINITY * spacing;
         let pose = graph.at_rest();
         graph.misfit_around(&pose, point, vicinity)?;
-        let start = cloud.moment(time, Some(bounds(&pose, spacing)), Some(CELL * spacing));
+        let start = features(cloud, time, &pose, None, point, spacing)?;
         let sources = Sources::on(&graph, &start);
         let pull = sources.pull_around(point, vicinity);
-        let (point, velocities) = (graph.skin(point), vec![DVec3::ZERO; graph.rest.len()]);
+        let point = graph.skin(point);
         let (graph, sources) = (Arc::new(graph), Arc::new(sources));
-        Some(Self { cloud, graph, sources, point, vicinity, pose, pull, velocities, time })
+        Some(Self { cloud, graph, sources, point, vicinity, pose, pull, velocities: None, time })
     }
 
     /// Moves the shape to a time. Returns whether it has moved: it does not if nodes around the point would be far from
-    /// where they are expected, unless that is `forced`, and not to places that are no numbers.
+    /// where they are expected, unless that is `forced`; and never to places that are no numbers.
     pub(super) fn advance(&mut self, time: f64, forced: bool) -> bool {
         let Self { cloud, graph, sources, .. } = &*self;
         let duration = time - self.time;
-        let moved = self.pose.places.iter().zip(&self.velocities);
-        let expected: Vec<DVec3> = moved.map(|(place, velocity)| place + velocity * (INERTIA * duration)).collect();
+        let mut expected = self.pose.places.clone();
+        for (place, velocity) in expected.iter_mut().zip(self.velocities.iter().flatten()) {
+            *place += velocity * (INERTIA * duration);
+        }
         let mut pose = Pose { places: expected.clone(), ..self.pose.clone() };
-        let bounds = bounds(&pose, graph.spacing);
-        let moment = cloud.moment(time, Some(bounds), Some(CELL * graph.spacing));
+        let point = self.point.place(graph, &pose);
+        let Some(moment) = features(cloud, time, &pose, self.velocities.as_deref(), point, graph.spacing) else {
+            return false;
+        };
         let mut candidates = Candidates::default();
         let mut pull = 0.0;
         for round in 0..ROUNDS {
@@ -113,7 +123,7 @@ impl<'a> Shape<'a> {
             return false;
         }
         let moved = pose.places.iter().zip(&self.pose.places);
-        self.velocities = moved.map(|(after, before)| (after - before) / duration).collect();
+        self.velocities = Some(moved.map(|(after, before)| (after - before) / duration).collect());
         (self.pose, self.pull, self.time) = (pose, pull, time);
         true
     }
@@ -142,9 +152,9 @@ impl<'a> Shape<'a> {
 
 /// Returns the median over the Gaussians around a point of the distance to one of their neighbors, capture units;
 /// `None` without Gaussians.
-fn spacing(start: &Moment, point: DVec3) -> Option<f64> {
+fn spacing(start: &Moment<Drawn>, point: DVec3) -> Option<f64> {
     let neighbor = |index: usize| {
-        let (_, square) = start.nearest(start.drawn[index].mean).take(NEIGHBOR + 1).last()?;
+        let (_, square) = start.nearest(start.all[index].mean).take(NEIGHBOR + 1).last()?;
         Some(square.sqrt())
     };
     let mut distances: Vec<f64> = start.nearest(point).take(SAMPLE).filter_map(|(index, _)| neighbor(index)).collect();
@@ -152,10 +162,28 @@ fn spacing(start: &Moment, point: DVec3) -> Option<f64> {
     distances.get(distances.len() / 2).copied()
 }
 
-/// Returns the box around a pose, with the Gaussians to which it can be pulled.
-fn bounds(pose: &Pose, spacing: f64) -> [DVec3; 2] {
-    let margin = DVec3::splat(MARGIN * spacing);
-    let low = pose.places.iter().copied().fold(DVec3::INFINITY, DVec3::min);
-    let high = pose.places.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
-    [low - margin, high + margin]
+/// Returns what a pose can be pulled to at a time, around a point in capture space: surfaces, and means of Gaussians
+/// that move as its nodes, if their velocities are known; `None` where the places are no numbers.
+fn features(
+    cloud: &Cloud,
+    time: f64,
+    pose: &Pose,
+    velocities: Option<&[DVec3]>,
+    point: DVec3,
+    spacing: f64,
+) -> Option<Moment<Feature>> {
+    if !pose.places.iter().all(|place| place.is_finite()) {
+        return None;
+    }
+    let [margin, around] = [MARGIN, AROUND].map(|distance| DVec3::splat(distance * spacing));
+    // A node that has gone astray does not widen the box.
+    let low = pose.places.iter().copied().fold(DVec3::INFINITY, DVec3::min).max(point - around) - margin;
+    let high = pose.places.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max).min(point + around) + margin;
+    // Gaussians beside the box, which are seen in it, are drawn as far as a margin from it.
+    let drawn = cloud.drawn(time, Some([low - margin, high + margin]));
+    let mut found = surface(&drawn, [low, high], PIXEL * spacing)?;
+    let known = pose.places.iter().zip(velocities.into_iter().flatten());
+    let nodes = RTree::bulk_load(known.map(|(place, velocity)| Moving::new(place.to_array(), *velocity)).collect());
+    found.extend(thinned(means(&drawn, [low, high], &nodes, spacing), PIXEL * spacing));
+    Some(Moment::of(found))
 }
