@@ -18,6 +18,8 @@ mod common;
 use bevy::asset::UnapprovedPathMode;
 use bevy::core_pipeline::tonemapping::Tonemapping;
 use bevy::prelude::*;
+use bevy::tasks::futures::check_ready;
+use bevy::tasks::{AsyncComputeTaskPool, Task};
 use bevy_gs4d::offline::sockets::{Placement, follow};
 use bevy_gs4d::offline::work::NoProgress;
 use bevy_gs4d::playback::SocketState;
@@ -40,6 +42,8 @@ const RATE: f32 = 60.0;
 struct Show {
     capture: PathBuf,
     points: Vec<[f32; 4]>,
+    /// The capture with its new sockets, while they are followed: for seconds, in which the app goes on.
+    following: Option<Task<std::result::Result<RuntimeScene, String>>>,
     /// Whether the hats are on; an error is why not.
     outcome: Option<std::result::Result<(), String>>,
 }
@@ -58,7 +62,7 @@ fn main() -> Result {
         capture = "island.gs4d";
         points.extend(ISLAND);
     }
-    let show = Show { capture: common::asset_path(capture), points, outcome: None };
+    let show = Show { capture: common::asset_path(capture), points, following: None, outcome: None };
     if let Some(folder) = arguments.headless {
         let mut app = testing::app(UVec2::new(960, 540));
         scene(&mut app, show);
@@ -129,9 +133,17 @@ fn put_on_hats(
     let orbit = Orbit::around(loaded);
     let (mut place, mut lens) = camera.into_inner();
     orbit.place(&mut place, &mut lens);
-    let scene = match with_sockets(loaded.scene(), &show.points) {
-        Ok(scene) => scene,
-        Err(fault) => {
+    let mut following = show.following.take().unwrap_or_else(|| {
+        let (scene, points) = (loaded.scene().clone(), show.points.clone());
+        AsyncComputeTaskPool::get().spawn(async move { with_sockets(&scene, &points) })
+    });
+    let scene = match check_ready(&mut following) {
+        None => {
+            show.following = Some(following);
+            return;
+        }
+        Some(Ok(scene)) => scene,
+        Some(Err(fault)) => {
             let fault = format!("{}: {fault}", show.capture.display());
             error!("{fault}");
             show.outcome = Some(Err(fault));
