@@ -111,10 +111,10 @@ impl Sources {
         Candidates { all, of }
     }
 
-    /// Returns how strongly sources around a point at rest are pulled at the start.
-    pub(super) fn pull_around(&self, point: DVec3, distance: f64) -> f64 {
-        let around = self.all.iter().filter(|source| source.skinned.rest.distance(point) <= distance);
-        around.map(|source| source.pull).sum::<f64>() / self.density
+    /// Returns how the sources are pulled at the start.
+    pub(super) fn start(&self) -> Vec<(&Skinned, Pull)> {
+        let pull = |source: &Source| Pull { force: DVec3::ZERO, stiffness: source.pull / self.density };
+        self.all.iter().map(|source| (&source.skinned, pull(source))).collect()
     }
 
     /// Returns the sources, and how they are pulled in a pose of a graph.

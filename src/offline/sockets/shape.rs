@@ -53,8 +53,9 @@ pub(super) struct Shape<'a> {
     /// Distance within which nodes and sources are around the point at rest, capture units.
     vicinity: f64,
     pose: Pose,
-    /// How strongly sources around the point are pulled.
+    /// How strongly sources around the point are pulled, and must be.
     pull: f64,
+    least: f64,
     /// The velocity of each node in the step before, capture units per timestamp unit; `None` before the first one.
     velocities: Option<Vec<DVec3>>,
     /// Timestamp units.
@@ -78,10 +79,11 @@ impl<'a> Shape<'a> {
         graph.misfit_around(&pose, point, vicinity)?;
         let start = features(cloud, time, &pose, None, point, spacing)?;
         let sources = Sources::on(&graph, &start);
-        let pull = sources.pull_around(point, vicinity);
+        let pull = strength(&sources.start(), point, vicinity);
         let point = graph.skin(point);
         let (graph, sources) = (Arc::new(graph), Arc::new(sources));
-        Some(Self { cloud, graph, sources, point, vicinity, pose, pull, velocities: None, time })
+        let least = LEAST_PULL * pull;
+        Some(Self { cloud, graph, sources, point, vicinity, pose, pull, least, velocities: None, time })
     }
 
     /// Moves the shape to a time. Returns whether it has moved: it does not if nodes around the point would be far from
@@ -130,7 +132,7 @@ impl<'a> Shape<'a> {
 
     /// Returns whether what is around the point is still pulled to something.
     pub(super) fn is_held(&self) -> bool {
-        self.pull >= LEAST_PULL * self.sources.pull_around(self.point.rest, self.vicinity)
+        self.pull >= self.least
     }
 
     /// Returns where the point is, capture space.
