@@ -166,3 +166,61 @@ pub(super) fn strength(pulls: &[(&Skinned, Pull)], place: DVec3, distance: f64) 
     let around = pulls.iter().filter(|(point, _)| point.rest.distance(place) <= distance);
     around.map(|(_, pull)| pull.stiffness).sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const COLORS: [Vec3; 2] = [Vec3::X, Vec3::Z];
+
+    /// Returns a square of features of side 5, each of the other color than those beside it, moved.
+    fn square(way: DVec3) -> Moment<Feature> {
+        let at = |x: usize, y: usize| DVec3::new(x as f64, y as f64, 0.0) + way;
+        let feature = |x: usize, y: usize| Feature { place: at(x, y), weight: 1.0, color: COLORS[(x + y) % 2] };
+        Moment::of((0..6).flat_map(|x| (0..6).map(move |y| feature(x, y))).collect())
+    }
+
+    fn graph(start: &Moment<Feature>) -> Graph {
+        let places: Vec<DVec3> = start.all.iter().map(|one| one.place).collect();
+        Graph::around(DVec3::ZERO, &places, 1.0).expect("there are nodes")
+    }
+
+    fn pulls<'a>(graph: &Graph, sources: &'a Sources, moment: &Moment<Feature>) -> Vec<(&'a Skinned, Pull)> {
+        let rest = graph.at_rest();
+        sources.pulls(graph, &rest, &sources.candidates(graph, &rest, moment), FINE)
+    }
+
+    #[test]
+    fn what_stands_is_not_pulled_and_what_has_moved_is_pulled_after_it() {
+        let start = square(DVec3::ZERO);
+        let graph = graph(&start);
+        let sources = Sources::on(&graph, &start);
+        let found = pulls(&graph, &sources, &start);
+        assert_eq!(found.len(), 36, "each feature is a source");
+        assert!(found.iter().all(|(_, pull)| pull.force.length() < 1e-9), "nothing has moved");
+        let [then, now] = [&sources.start(), &found].map(|pulls| strength(pulls, DVec3::ZERO, 9.0));
+        assert!((then - now).abs() < 1e-9 && then > 30.0, "all are pulled to where they are: {then}, {now}");
+        let way = DVec3::new(0.25, -0.1, 0.05);
+        for (point, pull) in pulls(&graph, &sources, &square(way)) {
+            let to = pull.force / pull.stiffness;
+            assert!(to.abs_diff_eq(way, 0.02), "{} is pulled by {to}", point.rest);
+        }
+    }
+
+    #[test]
+    fn features_are_pulled_to_those_of_their_color_and_hardly_to_those_far_away() {
+        let start = square(DVec3::ZERO);
+        let graph = graph(&start);
+        let sources = Sources::on(&graph, &start);
+        // A side of a cell away, the nearest ones have the other color.
+        let moved = pulls(&graph, &sources, &square(0.6 * DVec3::X));
+        let inside = moved.iter().filter(|(point, _)| point.rest.x < 4.5);
+        let least = inside.map(|(_, pull)| pull.force.x / pull.stiffness).fold(f64::INFINITY, f64::min);
+        assert!(least > 0.5, "one is pulled by {least}: to the other color, 0.4 the other way");
+        let far = pulls(&graph, &sources, &square(9.0 * DVec3::Z));
+        let [then, now] = [&sources.start(), &far].map(|pulls| strength(pulls, DVec3::ZERO, 9.0));
+        assert!(now < 0.01 * then, "what is far away holds nothing: {now} of {then}");
+        let nothing = pulls(&graph, &sources, &Moment::of(Vec::new()));
+        assert!(strength(&nothing, DVec3::ZERO, 9.0) == 0.0, "nothing is there");
+    }
+}
