@@ -1,11 +1,12 @@
 //! What is there at a time, by place.
 //!
 //! In: the Gaussians that are drawn at a time ([`Drawn`]), or what a shape can be pulled to ([`Feature`]). Out: a
-//! [`Moment`] of either, in which those nearest to a point are found.
+//! [`Moment`] of either, in which those nearest to a point are found; features of which each cell has one.
 
 use glam::{DMat3, DVec3, Vec3};
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
+use std::collections::HashMap;
 
 /// A Gaussian at a time.
 #[derive(Debug, Clone, Copy)]
@@ -62,6 +63,20 @@ pub(super) struct Moment<T> {
 /// Returns whether a place is in a box, both in capture space.
 pub(super) fn is_inside(place: DVec3, [low, high]: [DVec3; 2]) -> bool {
     place.cmpge(low).all() && place.cmple(high).all()
+}
+
+/// Returns the feature that counts most in each cell of this side (capture units), in their order.
+pub(super) fn thinned(mut points: Vec<Feature>, cell: f64) -> Vec<Feature> {
+    // -0 and 0 are one cell.
+    let at = |one: &Feature| ((one.place / cell).floor() + DVec3::ZERO).to_array().map(f64::to_bits);
+    let mut best: HashMap<[u64; 3], f64> = HashMap::new();
+    for one in &points {
+        let weight = best.entry(at(one)).or_insert(one.weight);
+        *weight = weight.max(one.weight);
+    }
+    // Of equal ones the first.
+    points.retain(|one| best.get(&at(one)).is_some_and(|best| one.weight >= *best) && best.remove(&at(one)).is_some());
+    points
 }
 
 /// A place, with the index of what is there.

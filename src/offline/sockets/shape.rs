@@ -7,9 +7,9 @@
 use super::cloud::Cloud;
 use super::graph::{Graph, Pose, Skinned};
 use super::means::{Moving, means};
-use super::moment::{Drawn, Feature, Moment};
+use super::moment::{Drawn, Feature, Moment, thinned};
 use super::registration::{Candidates, ROUNDS, SEARCH, Sources, strength};
-use super::surface::{surface, thinned};
+use super::surface::surface;
 use glam::{DQuat, DVec3};
 use rstar::RTree;
 use std::sync::Arc;
@@ -79,7 +79,8 @@ impl<'a> Shape<'a> {
         graph.misfit_around(&pose, point, vicinity)?;
         let start = features(cloud, time, &pose, None, point, spacing)?;
         let sources = Sources::on(&graph, &start);
-        let pull = strength(&sources.start(), point, vicinity);
+        let held = sources.pulls(&graph, &pose, &sources.candidates(&graph, &pose, &start), ROUNDS);
+        let pull = strength(&held, point, vicinity);
         let point = graph.skin(point);
         let (graph, sources) = (Arc::new(graph), Arc::new(sources));
         let least = LEAST_PULL * pull;

@@ -6,11 +6,10 @@
 //! Gaussian Splatting" (Kerbl and others, 2023); the depth of a pixel is the mean of the depths of its Gaussians, of
 //! each where it is densest along the ray, weighted as their colors.
 
-use super::moment::{Drawn, Feature, is_inside};
+use super::moment::{Drawn, Feature, is_inside, thinned};
 use crate::gaussian::alpha::{ALPHA_MAX, ALPHA_MIN};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
-use std::collections::HashMap;
 
 /// Directions of view, not normalized: along the axes of the capture and the diagonals of its octants.
 const DIRECTIONS: [[f64; 3]; 14] = [
@@ -167,20 +166,6 @@ impl View {
             color: pixel.color / opacity as f32,
         })
     }
-}
-
-/// Returns the feature that counts most in each cell of this side (capture units), in their order.
-pub(super) fn thinned(mut points: Vec<Feature>, cell: f64) -> Vec<Feature> {
-    // -0 and 0 are one cell.
-    let at = |one: &Feature| ((one.place / cell).floor() + DVec3::ZERO).to_array().map(f64::to_bits);
-    let mut best: HashMap<[u64; 3], f64> = HashMap::new();
-    for one in &points {
-        let weight = best.entry(at(one)).or_insert(one.weight);
-        *weight = weight.max(one.weight);
-    }
-    // Of equal ones the first.
-    points.retain(|one| best.get(&at(one)).is_some_and(|best| one.weight >= *best) && best.remove(&at(one)).is_some());
-    points
 }
 
 #[cfg(test)]
