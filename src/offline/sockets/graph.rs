@@ -59,11 +59,13 @@ pub(super) struct Skinned {
     pub carriers: Vec<(usize, f64)>,
 }
 
-/// What pulls at a point: a force, and by how much it falls for each unit of the way.
+/// What pulls at a point: a force, by how much it falls along each way of the point (symmetric, no eigenvalue is
+/// negative), and how much it counts.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Pull {
     pub force: DVec3,
-    pub stiffness: f64,
+    pub stiffness: DMat3,
+    pub weight: f64,
 }
 
 impl Graph {
@@ -158,9 +160,10 @@ impl Graph {
             .collect();
         let mut diagonal = weights.clone();
         for (point, pull) in pulls {
+            let [x, y, z] = [pull.stiffness.x_axis.x, pull.stiffness.y_axis.y, pull.stiffness.z_axis.z];
             for &(node, weight) in &point.carriers {
                 forces[node] += pull.force * weight;
-                diagonal[node] += pull.stiffness * (weight * weight);
+                diagonal[node] += (x + y + z) / 3.0 * (weight * weight);
             }
         }
         let inverse: Vec<f64> = diagonal.iter().map(|weight| weight.recip()).collect();
@@ -172,7 +175,7 @@ impl Graph {
             let mut answer: Vec<DVec3> = nodes.clone().map(of).collect();
             for (point, pull) in pulls {
                 let way: DVec3 = point.carriers.iter().map(|&(node, weight)| ways[node] * weight).sum();
-                let against = way * pull.stiffness;
+                let against = pull.stiffness * way;
                 point.carriers.iter().for_each(|&(node, weight)| answer[node] += against * weight);
             }
             answer
@@ -358,7 +361,7 @@ mod tests {
             graph.turn(&mut pose);
             let pull = |point| {
                 let force = moved(Skinned::clone(point).rest) - point.place(&graph, &pose);
-                Pull { force, stiffness: 1.0 }
+                Pull { force, stiffness: DMat3::IDENTITY, weight: 1.0 }
             };
             let pulls: Vec<(&Skinned, Pull)> = pulled.iter().map(|point| (point, pull(point))).collect();
             pose.places = graph.balanced(&pose, &pulls, 1.0, &expected, 0.0);

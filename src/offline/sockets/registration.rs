@@ -6,10 +6,15 @@
 //! Each feature of the start is pulled to a mixture of the nearest ones at the time (soft correspondences, as in EM-ICP
 //! of Granger and Pennec, 2002): more to those with its color, and not to those that are far. How it is pulled at the
 //! start, when nothing has moved, is subtracted: what is at rest stays.
+//!
+//! With the weights `w` of the features at `q` and the scale `s` of distances, the energy of a feature of the start at
+//! `x` is `-ln sum w exp(-|q - x|² / 2 s²)`. Times s², its slope is the way to the mean of the mixture, and its second
+//! derivative `1 - C / s²` for the covariance C of the mixture. So a pull hardly resists motion along what looks alike:
+//! with 1 in its place, as in EM, each round would go a small part of such a way.
 
 use super::graph::{Graph, Pose, Pull, Skinned};
 use super::moment::{Feature, Moment};
-use glam::{DVec3, Vec3};
+use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 use rstar::RTree;
 
@@ -81,8 +86,8 @@ impl Sources {
         for round in 0..=FINE {
             let found = sources.pulled_with_start(graph, &rest, &candidates, round);
             for (source, pull) in sources.all.iter_mut().zip(found) {
-                // A source without a pull has no stiffness.
-                source.offsets[round] = if pull.stiffness > 0.0 { pull.force / pull.stiffness } else { DVec3::ZERO };
+                // A source without a pull has no weight.
+                source.offsets[round] = if pull.weight > 0.0 { pull.force / pull.weight } else { DVec3::ZERO };
             }
         }
         sources
@@ -118,8 +123,9 @@ impl Sources {
     ) -> Vec<(&Skinned, Pull)> {
         let without_start = |source: &Source, pull: Pull| {
             let rotation = source.skinned.rotation(pose);
-            let force = pull.force - rotation * source.offsets[round.min(FINE)] * pull.stiffness;
-            Pull { force: force / self.density, stiffness: pull.stiffness / self.density }
+            let force = pull.force - rotation * source.offsets[round.min(FINE)] * pull.weight;
+            let part = self.density.recip();
+            Pull { force: force * part, stiffness: pull.stiffness * part, weight: pull.weight * part }
         };
         let found = self.pulled_with_start(graph, pose, candidates, round);
         self.all.iter().zip(found).map(|(source, pull)| (&source.skinned, without_start(source, pull))).collect()
@@ -142,11 +148,21 @@ impl Sources {
             let best = weights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
             weights.iter_mut().for_each(|weight| *weight = (*weight - best).exp());
             let sum: f64 = weights.iter().sum();
-            let ways = weights.iter().zip(of).map(|(weight, &index)| (candidates.all[index].place - place) * *weight);
-            let way = ways.sum::<DVec3>() / sum;
-            let stiffness = source.weight / (1.0 + way.length_squared() / (far * far)).powi(2);
-            // Without candidates it is no number.
-            if way.is_finite() { Pull { force: way * stiffness, stiffness } } else { Pull::default() }
+            let ways =
+                || weights.iter().zip(of).map(|(part, &index)| (candidates.all[index].place - place, part / sum));
+            let way = ways().map(|(way, part)| way * part).sum::<DVec3>();
+            let weight = source.weight / (1.0 + way.length_squared() / (far * far)).powi(2);
+            if of.is_empty() || !way.is_finite() {
+                return Pull::default();
+            }
+            let mut covariance = DMat3::ZERO;
+            for (other, part) in ways() {
+                let aside = (other - way) / scale;
+                covariance += DMat3::from_cols(aside * aside.x, aside * aside.y, aside * aside.z) * part;
+            }
+            // Between two places that are far apart it would be negative.
+            let most = covariance.to_cols_array().iter().map(|entry| entry * entry).sum::<f64>().sqrt().max(1.0);
+            Pull { force: way * weight, stiffness: (DMat3::IDENTITY - covariance * most.recip()) * weight, weight }
         };
         self.all.par_iter().zip(&candidates.of).map(pulled).collect()
     }
@@ -155,7 +171,7 @@ impl Sources {
 /// Returns how strongly points around a place at rest are pulled.
 pub(super) fn strength(pulls: &[(&Skinned, Pull)], place: DVec3, distance: f64) -> f64 {
     let around = pulls.iter().filter(|(point, _)| point.rest.distance(place) <= distance);
-    around.map(|(_, pull)| pull.stiffness).sum()
+    around.map(|(_, pull)| pull.weight).sum()
 }
 
 #[cfg(test)]
@@ -193,7 +209,7 @@ mod tests {
         assert!(held > 30.0, "all are pulled to where they are: {held}");
         let way = DVec3::new(0.25, -0.1, 0.05);
         for (point, pull) in pulls(&graph, &sources, &square(way)) {
-            let to = pull.force / pull.stiffness;
+            let to = pull.force / pull.weight;
             assert!(to.abs_diff_eq(way, 0.02), "{} is pulled by {to}", point.rest);
         }
     }
@@ -206,12 +222,30 @@ mod tests {
         // A side of a cell away, the nearest ones have the other color.
         let moved = pulls(&graph, &sources, &square(0.6 * DVec3::X));
         let inside = moved.iter().filter(|(point, _)| point.rest.x < 4.5);
-        let least = inside.map(|(_, pull)| pull.force.x / pull.stiffness).fold(f64::INFINITY, f64::min);
+        let least = inside.map(|(_, pull)| pull.force.x / pull.weight).fold(f64::INFINITY, f64::min);
         assert!(least > 0.5, "one is pulled by {least}: to the other color, 0.4 the other way");
         let far = pulls(&graph, &sources, &square(9.0 * DVec3::Z));
         let [then, now] = [&pulls(&graph, &sources, &start), &far].map(|pulls| strength(pulls, DVec3::ZERO, 9.0));
         assert!(now < 0.01 * then, "what is far away holds nothing: {now} of {then}");
         let nothing = pulls(&graph, &sources, &Moment::of(Vec::new()));
         assert!(strength(&nothing, DVec3::ZERO, 9.0) == 0.0, "nothing is there");
+    }
+    #[test]
+    fn pulls_resist_motion_across_a_line_of_one_color_and_hardly_along_it() {
+        let line = |color: &dyn Fn(usize) -> Vec3| {
+            let feature = |x: usize| Feature { place: 0.2 * x as f64 * DVec3::X, weight: 1.0, color: color(x) };
+            Moment::of((0..40).map(feature).collect())
+        };
+        let resist = |start: &Moment<Feature>| {
+            let graph = graph(start);
+            let sources = Sources::on(&graph, start);
+            let found = pulls(&graph, &sources, start);
+            let (_, pull) = found.iter().find(|(point, _)| point.rest.x > 3.9).expect("the middle of the line");
+            [pull.stiffness * DVec3::X, pull.stiffness * DVec3::Y].map(|against| against.length() / pull.weight)
+        };
+        let [along, across] = resist(&line(&|_| Vec3::X));
+        assert!(along < 0.1 && across > 0.99, "along the line {along}, across it {across}");
+        let [along, across] = resist(&line(&|x| COLORS[usize::from(x >= 20)]));
+        assert!(along > 0.2 && across > 0.99, "where the color changes {along}, across {across}");
     }
 }

@@ -39,9 +39,9 @@ const VICINITY: f64 = 5.0;
 const PIXEL: f64 = 0.4;
 /// Least part of the pulls around the point at the start that must still be there.
 const LEAST_PULL: f64 = 0.1;
-/// Error of a point for each unit of misfit of the edges around it: the root of the mean square over the cloths of the
-/// film of the island, found when means alone pulled (docs/benchmarks.md, "Sockets").
-const ERROR_OF_MISFIT: f64 = 5.0;
+/// Error of a point for each unit of misfit of the edges around it: of 12 points of the streamers and lanterns of the
+/// film of the island, the root of the mean square over 49 times (docs/benchmarks.md, "Sockets").
+const ERROR_OF_MISFIT: f64 = 7.4;
 
 /// What is around a point.
 #[derive(Clone)]
