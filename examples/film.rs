@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! cargo run --release --features viewer --example film -- [FOLDER] [--rig RIG] [--cameras N] [--times N] \
-//!     [--size SIZE] [--test-at FRACTION] [--take SECONDS --from SECONDS --until SECONDS]
+//!     [--shutter SHUTTER] [--size SIZE] [--test-at FRACTION] [--take SECONDS --from SECONDS --until SECONDS]
 //! examples/film/island.sh [FOLDER]
 //! examples/film/take.sh [FOLDER]
 //! ```
@@ -14,9 +14,10 @@
 //! sockets.
 //!
 //! Defaults: the folder `dataset`, 32 cameras on a hemisphere, each with its own offset of the shutter, 96 times over
-//! four seconds, pictures of 800x800. Every eighth camera is for the test, another eighth for validation. `--rig grid`
-//! is a rig as of the dataset N3V: 21 cameras in three rows before the scene, which film at the same moments, the one
-//! in the middle for the test. `--test-at` films the cameras of the test alone, all at once, so far between each time
+//! four seconds, pictures of 800x800. Every eighth camera is for the test, another eighth for validation. `--shutter
+//! together` lets all film at the same moments, as `gs4d footage` needs it. `--rig grid` is a rig as of the dataset N3V:
+//! 21 cameras in three rows before the scene, which film at the same moments, the one in the middle for the test.
+//! `--test-at` films the cameras of the test alone, all at once, so far between each time
 //! and the next: 0 at the moments of the first camera, 0.5 halfway between them. `--take` is the length of a longer take,
 //! in which the sun moves and petals fall along other ways in each loop; `--from` and `--until` film a segment of it.
 
@@ -38,7 +39,7 @@ fn main() -> Result {
     // On a server without a session nothing is printed about that.
     silence_wayland();
     let (mut folder, [mut cameras, mut times], mut size) = (None, [32, 96], UVec2::splat(800));
-    let (mut is_grid, mut test_at) = (false, None);
+    let (mut is_grid, mut is_together, mut test_at) = (false, false, None);
     let (mut take, mut from, mut until) = (None, 0.0, None);
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
@@ -48,9 +49,10 @@ fn main() -> Result {
                 header.for_each(|line| println!("{}", line.strip_prefix(' ').unwrap_or(line)));
                 return Ok(());
             }
-            "--rig" | "--cameras" | "--times" | "--size" | "--test-at" | "--take" | "--from" | "--until" => {}
+            "--rig" | "--cameras" | "--times" | "--shutter" | "--size" | "--test-at" | "--take" | "--from"
+            | "--until" => {}
             option if option.starts_with('-') => {
-                let options = "--rig, --cameras, --times, --size, --test-at, --take, --from and --until";
+                let options = "--rig, --cameras, --times, --shutter, --size, --test-at, --take, --from and --until";
                 return Err(format!("{option}: the options are {options}").into());
             }
             _ if folder.is_some() => return Err(format!("{argument}: more than one folder; name one").into()),
@@ -70,6 +72,10 @@ fn main() -> Result {
                 return Err(format!("--rig {text}: the rigs are hemisphere and grid").into());
             }
             "--rig" => is_grid = text == "grid",
+            "--shutter" if !["staggered", "together"].contains(&text.as_str()) => {
+                return Err(format!("--shutter {text}: the shutters are staggered and together").into());
+            }
+            "--shutter" => is_together = text == "together",
             "--cameras" => cameras = number(&text)?,
             "--times" => times = number(&text)?,
             "--take" => take = Some(seconds(&text)?),
@@ -98,7 +104,8 @@ fn main() -> Result {
 
     let mut app = testing::app(UVec2::splat(64));
     app.insert_resource(island::Take { seconds: length }).add_systems(Startup, island::spawn);
-    let film = Film { size, ..film(is_grid, cameras as usize, times, between, test_at) };
+    let film = film(is_grid, cameras as usize, times, between, test_at);
+    let film = Film { size, stagger: film.stagger && !is_together, ..film };
     let filmed = testing::film(&mut app, &film, folder.as_ref(), island::place, |done, all| {
         print!("\r{done} of {all} pictures");
         // A line that is not shown is no reason to stop.
