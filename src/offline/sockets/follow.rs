@@ -28,8 +28,9 @@ const NEAREST: f64 = 0.01;
 const ONE_SIDE: f64 = 0.85;
 /// Largest estimate of the error, as a part of the size of the capture: beyond, the point is lost.
 const LARGEST_ERROR: f64 = 0.1;
-/// Smallest part of the colors at the start that are still around the point.
-const LEAST_SHARE: f64 = 0.3;
+/// Smallest part of the colors at the start that are still around the point: about half of the least of eight points of
+/// the streamers and lanterns of the film of the island.
+const LEAST_SHARE: f64 = 0.25;
 /// Smallest distance within which colors are looked at, as a part of the size of the capture.
 const LOOK: f64 = 0.01;
 /// Number of steps over the time interval, and how often each may be halved where the shape does not move as expected.

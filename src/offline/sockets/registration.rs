@@ -37,6 +37,7 @@ const FINE: usize = 6;
 pub(super) const SEARCH: usize = 5;
 
 /// The features at the start that are on the graph.
+#[derive(Default)]
 pub(super) struct Sources {
     all: Vec<Source>,
     /// The mean number of sources of a node.

@@ -27,6 +27,8 @@ const STIFFNESS: f64 = 0.7;
 const INERTIA: f64 = 0.5;
 /// How strongly nodes stay where they are expected: it decides for nodes that nothing else pulls.
 const HOLD: f64 = 0.01;
+/// Length of the step that tells how nodes move at the start, as a part of the time interval of the capture.
+const TRIAL: f64 = 1.0 / 64.0;
 /// Distance around the nodes within which features are found, and from the point, in spacings.
 const MARGIN: f64 = 5.0;
 const AROUND: f64 = 40.0;
@@ -77,14 +79,34 @@ impl<'a> Shape<'a> {
         let vicinity = graph.distance(point) + VICINITY * spacing;
         let pose = graph.at_rest();
         graph.misfit_around(&pose, point, vicinity)?;
-        let start = features(cloud, time, &pose, None, point, spacing)?;
-        let sources = Sources::on(&graph, &start);
-        let held = sources.pulls(&graph, &pose, &sources.candidates(&graph, &pose, &start), ROUNDS);
-        let pull = strength(&held, point, vicinity);
-        let point = graph.skin(point);
-        let (graph, sources) = (Arc::new(graph), Arc::new(sources));
-        let least = LEAST_PULL * pull;
-        Some(Self { cloud, graph, sources, point, vicinity, pose, pull, least, velocities: None, time })
+        let start = Self {
+            cloud,
+            sources: Arc::default(),
+            point: graph.skin(point),
+            graph: Arc::new(graph),
+            vicinity,
+            pose,
+            pull: 0.0,
+            least: 0.0,
+            velocities: None,
+            time,
+        };
+        let start = start.with_sources()?;
+        // Which means move as the nodes is known after a step only.
+        let mut next = start.clone();
+        next.advance(time + TRIAL * cloud.span, true);
+        Self { velocities: next.velocities, ..start }.with_sources()
+    }
+
+    /// Returns the shape, at rest, with what is on it at its time as sources; `None` where its places are no numbers.
+    fn with_sources(self) -> Option<Self> {
+        let Self { cloud, graph, pose, vicinity, .. } = &self;
+        let point = self.point.rest;
+        let start = features(cloud, self.time, pose, self.velocities.as_deref(), point, graph.spacing)?;
+        let sources = Sources::on(graph, &start);
+        let held = sources.pulls(graph, pose, &sources.candidates(graph, pose, &start), ROUNDS);
+        let pull = strength(&held, point, *vicinity);
+        Some(Self { sources: Arc::new(sources), pull, least: LEAST_PULL * pull, ..self })
     }
 
     /// Moves the shape to a time. Returns whether it has moved: it does not if nodes around the point would be far from
