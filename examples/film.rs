@@ -15,11 +15,11 @@
 //!
 //! Defaults: the folder `dataset`, 32 cameras on a hemisphere, each with its own offset of the shutter, 96 times over
 //! four seconds, pictures of 800x800. Every eighth camera is for the test, another eighth for validation. `--shutter
-//! together` lets all film at the same moments, as `gs4d footage` needs it. `--rig grid` is a rig as of the dataset N3V:
-//! 21 cameras in three rows before the scene, which film at the same moments, the one in the middle for the test.
-//! `--test-at` films the cameras of the test alone, all at once, so far between each time
-//! and the next: 0 at the moments of the first camera, 0.5 halfway between them. `--take` is the length of a longer take,
-//! in which the sun moves and petals fall along other ways in each loop; `--from` and `--until` film a segment of it.
+//! together` lets all film at the same moments, as `gs4d footage` needs it. `--rig grid` is a rig as of the dataset
+//! N3V: 21 cameras in three rows before the scene, which film at the same moments, the one in the middle for the test.
+//! `--test-at` films the cameras of the test alone, all at once, so far between each time and the next: 0 at the
+//! moments of the first camera, 0.5 halfway between them. `--take` is the length of a longer take, in which the sun
+//! moves and petals fall along other ways in each loop; `--from` and `--until` film a segment of it.
 
 #[path = "film/island.rs"]
 mod island;

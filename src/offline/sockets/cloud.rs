@@ -22,8 +22,8 @@ pub(super) struct Cloud {
     pieces: Vec<Piece>,
     /// The diagonal of the middle of the capture, capture units.
     pub size: f64,
-    /// The length of the time interval, timestamp units.
-    pub span: f64,
+    /// The first and the last time, timestamp units.
+    pub interval: [f64; 2],
 }
 
 /// A Gaussian, and the times between which it is drawn.
@@ -57,8 +57,12 @@ impl Cloud {
         let pieces: Vec<Piece> = gaussians.iter().enumerate().filter_map(piece).collect();
         let core = Bounds::core(pieces.iter().map(|piece| piece.gaussian));
         let size = core.map_or(0.0, |core| 2.0 * f64::from(core.radius()));
-        let span = f64::from(time_interval[1]) - f64::from(time_interval[0]);
-        Ok(Self { pieces, size, span })
+        Ok(Self { pieces, size, interval: time_interval.map(f64::from) })
+    }
+
+    /// Returns the length of the time interval, timestamp units.
+    pub(super) fn span(&self) -> f64 {
+        self.interval[1] - self.interval[0]
     }
 
     /// Returns the Gaussians that are drawn at `time` (timestamp units), of those whose means are in a box (capture
@@ -75,7 +79,7 @@ impl Cloud {
             (opacity > FAINTEST && mean.is_finite() && is_in_box).then(|| {
                 let covariance = matrix(gaussian, 0.0).as_dmat3();
                 let velocity = Vec3::from(gaussian.velocity).as_dvec3();
-                let duration = f64::from(gaussian.sigma_t).min(self.span);
+                let duration = f64::from(gaussian.sigma_t).min(self.span());
                 Drawn { mean, opacity: opacity.into(), covariance, color: *color, velocity, duration }
             })
         };

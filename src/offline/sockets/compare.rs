@@ -96,7 +96,7 @@ fn of_point(
     let Some(Stretch { start: (time, position), places, interval }) = Stretch::of(point, [first, last]) else {
         return Err(SocketError::Unknown { name, first, last });
     };
-    let share = (f64::from(interval[1]) - f64::from(interval[0])) / cloud.span;
+    let share = (f64::from(interval[1]) - f64::from(interval[0])) / cloud.span();
     let samples = (samples.saturating_sub(1) as f64 * share).ceil() as usize + 1;
     let placement = Placement { name: name.clone(), position, time, samples: samples.max(2) };
     let found = match follow_within(cloud, interval, &placement, progress) {

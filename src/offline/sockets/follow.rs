@@ -243,7 +243,7 @@ impl<'a> Follower<'a> {
 
     /// Returns the number of steps between two times.
     fn steps(&self, from: f64, to: f64) -> usize {
-        ((to - from).abs() / self.cloud.span * STEPS).ceil() as usize
+        ((to - from).abs() / self.cloud.span() * STEPS).ceil() as usize
     }
 
     /// Returns whether what the point was placed on is still around it.

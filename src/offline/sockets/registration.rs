@@ -231,6 +231,7 @@ mod tests {
         let nothing = pulls(&graph, &sources, &Moment::of(Vec::new()));
         assert!(strength(&nothing, DVec3::ZERO, 9.0) == 0.0, "nothing is there");
     }
+
     #[test]
     fn pulls_resist_motion_across_a_line_of_one_color_and_hardly_along_it() {
         let line = |color: &dyn Fn(usize) -> Vec3| {

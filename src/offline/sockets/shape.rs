@@ -27,8 +27,9 @@ const STIFFNESS: f64 = 0.7;
 const INERTIA: f64 = 0.5;
 /// How strongly nodes stay where they are expected: it decides for nodes that nothing else pulls.
 const HOLD: f64 = 0.01;
-/// Length of the step that tells how nodes move at the start, as a part of the time interval of the capture.
-const TRIAL: f64 = 1.0 / 64.0;
+/// Lengths of the step that tells how nodes move at the start, as parts of the time interval of the capture: that of the
+/// first counts over which the shape moves as expected.
+const TRIALS: [f64; 3] = [1.0 / 64.0, 1.0 / 256.0, 1.0 / 1024.0];
 /// Distance around the nodes within which features are found, and from the point, in spacings.
 const MARGIN: f64 = 5.0;
 const AROUND: f64 = 40.0;
@@ -92,10 +93,17 @@ impl<'a> Shape<'a> {
             time,
         };
         let start = start.with_sources()?;
-        // Which means move as the nodes is known after a step only.
-        let mut next = start.clone();
-        next.advance(time + TRIAL * cloud.span, true);
-        Self { velocities: next.velocities, ..start }.with_sources()
+        // Which means move as the nodes is known after a step only. It ends within the time interval.
+        let trial = |part: f64| {
+            let length = part * cloud.span();
+            let end = if time + length <= cloud.interval[1] { time + length } else { time - length };
+            let mut next = start.clone();
+            (length > 0.0 && next.advance(end, false)).then_some(next.velocities)
+        };
+        match TRIALS.into_iter().find_map(trial) {
+            Some(velocities) => Self { velocities, ..start }.with_sources(),
+            None => Some(start),
+        }
     }
 
     /// Returns the shape, at rest, with what is on it at its time as sources; `None` where its places are no numbers.
