@@ -262,7 +262,7 @@ fn at_rest(q: DVec4) -> DVec4 {
 }
 
 /// Returns `a bᵀ`.
-fn outer(a: DVec3, b: DVec3) -> DMat3 {
+pub(crate) fn outer(a: DVec3, b: DVec3) -> DMat3 {
     DMat3::from_cols(a * b.x, a * b.y, a * b.z)
 }
 

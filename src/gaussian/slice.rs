@@ -2,6 +2,7 @@
 //!
 //! In: raw [`Parameters`]. Out: one [`Gaussian`] each, activated, in capture space, computed in double precision.
 
+use super::gradient::outer;
 use super::lifespan::Lifespan;
 use super::parameters::{Model, Parameters};
 use glam::{DMat3, DMat4, DQuat, DVec3, DVec4, Vec3};
@@ -139,10 +140,9 @@ impl Parameters {
                 let m = q * DMat4::from_diagonal(s);
                 let sigma = m * m.transpose();
                 let (a, c, v) = (DMat3::from_mat4(sigma), sigma.w_axis.truncate(), sigma.w_axis.w);
-                let outer = DMat3::from_cols(c * c.x, c * c.y, c * c.z);
                 // Equal quaternions give a Gaussian at rest: what rounding leaves of its velocity costs bits in a package.
                 let is_at_rest = self.rotation_l[index] == self.rotation_r[index];
-                (a - outer * v.recip(), if is_at_rest { DVec3::ZERO } else { c / v }, v + prefilter)
+                (a - outer(c, c) * v.recip(), if is_at_rest { DVec3::ZERO } else { c / v }, v + prefilter)
             }
             Model::Unrotated4d => {
                 // The original uses the temporal scale as the variance here, not squared.

@@ -15,6 +15,7 @@
 use crate::gaussian::alpha::{ALPHA_MAX, ALPHA_MIN};
 use crate::gaussian::axes::Axes;
 use crate::gaussian::conic::LOW_PASS;
+use crate::gaussian::gradient::outer;
 use crate::gaussian::harmonics::time_cosine;
 use crate::gaussian::{Gaussian, Harmonics, Parameters, lifespan_reach};
 use crate::scene::{Sliced, Trained};
@@ -200,9 +201,9 @@ fn push_merged(made: &mut Trained, set: &[Seen<'_>], harmonics: &Harmonics, span
     let velocity = if along > 0.0 { moved / along } else { mean_3(&velocity_of) };
     let spread = set.iter().fold(DMat3::ZERO, |sum, one| {
         let (apart, own) = (one.mean_at(middle(one)) - center, velocity_of(one));
-        sum + (covariance(one.gaussian) + outer(own) * shown(one) + outer(apart)) * one.weight
+        sum + (covariance(one.gaussian) + outer(own, own) * shown(one) + outer(apart, apart)) * one.weight
     });
-    let conditional = spread * total.recip() - outer(velocity) * along;
+    let conditional = spread * total.recip() - outer(velocity, velocity) * along;
     // Opacity.
     let thick = total / (area(conditional, low_pass) * sigma_t.min(span));
     let opacity = opacity_of(thick);
@@ -227,7 +228,7 @@ fn push_merged(made: &mut Trained, set: &[Seen<'_>], harmonics: &Harmonics, span
 /// Returns the covariance in space and time of a Gaussian with this covariance in space at each time, this velocity and
 /// this temporal variance.
 fn joint_covariance(conditional: DMat3, velocity: DVec3, variance_t: f64) -> DMat4 {
-    let block = conditional + outer(velocity) * variance_t;
+    let block = conditional + outer(velocity, velocity) * variance_t;
     let across = velocity * variance_t;
     DMat4::from_cols(
         block.x_axis.extend(across.x),
@@ -255,10 +256,6 @@ fn merged_color(set: &[Seen<'_>], total: f64, harmonics: &Harmonics, mean_t: f64
 fn covariance(gaussian: &Gaussian) -> DMat3 {
     let [xx, xy, xz, yy, yz, zz] = gaussian.covariance.map(f64::from);
     DMat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz])
-}
-
-fn outer(v: DVec3) -> DMat3 {
-    DMat3::from_cols(v * v.x, v * v.y, v * v.z)
 }
 
 /// Returns the area of a splat without its factor 2π, capture units squared: a mean over directions, with the low-pass.

@@ -9,6 +9,7 @@
 //! with the rotation R of each node. Points between nodes move with the nearest ones, as in Sumner and others,
 //! "Embedded Deformation for Shape Manipulation" (2007).
 
+use crate::gaussian::gradient::outer;
 use glam::{DMat3, DQuat, DVec3};
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
@@ -129,7 +130,7 @@ impl Graph {
             let mut covariance = DMat3::ZERO;
             for &(other, weight) in edges {
                 let (from, to) = (self.rest[other] - self.rest[node], pose.places[other] - pose.places[node]);
-                covariance += DMat3::from_cols(to * from.x, to * from.y, to * from.z) * weight;
+                covariance += outer(to, from) * weight;
             }
             pose.rotations[node] = rotation(&covariance, pose.rotations[node]);
         }

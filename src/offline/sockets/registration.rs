@@ -14,6 +14,7 @@
 
 use super::graph::{Graph, Pose, Pull, Skinned};
 use super::moment::{Feature, Moment};
+use crate::gaussian::gradient::outer;
 use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 use rstar::RTree;
@@ -159,7 +160,7 @@ impl Sources {
             let mut covariance = DMat3::ZERO;
             for (other, part) in ways() {
                 let aside = (other - way) / scale;
-                covariance += DMat3::from_cols(aside * aside.x, aside * aside.y, aside * aside.z) * part;
+                covariance += outer(aside, aside) * part;
             }
             // Between two places that are far apart it would be negative.
             let most = covariance.to_cols_array().iter().map(|entry| entry * entry).sum::<f64>().sqrt().max(1.0);

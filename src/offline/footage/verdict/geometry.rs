@@ -2,6 +2,7 @@
 //!
 //! In: cameras. Out: [`center`]: the point that they look at; [`Projector`]: the pixel of a point.
 
+use crate::gaussian::gradient::outer;
 use crate::view::{Camera, Lens};
 use glam::{DMat3, DVec3, Mat4, UVec2, Vec2, Vec3};
 
@@ -27,8 +28,7 @@ pub(super) fn center<'a>(cameras: impl Iterator<Item = &'a Camera>) -> DVec3 {
     let count = rays.len().max(1) as f64;
     let (mut sum, mut at) = (DMat3::ZERO, DVec3::ZERO);
     for &(origin, direction) in &rays {
-        let outer = DMat3::from_cols(direction * direction.x, direction * direction.y, direction * direction.z);
-        let across = DMat3::IDENTITY - outer;
+        let across = DMat3::IDENTITY - outer(direction, direction);
         sum += across;
         at += across * origin;
     }

@@ -6,6 +6,7 @@
 
 use super::error_peaks::Peak;
 use super::pinhole::Pinhole;
+use crate::gaussian::gradient::outer;
 use crate::view::View;
 use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
@@ -202,7 +203,7 @@ fn closest_point(rays: impl Iterator<Item = (Vec3, Vec3)>) -> Option<Vec3> {
     let (mut sum, mut at) = (DMat3::ZERO, DVec3::ZERO);
     for (origin, direction) in rays {
         let (origin, along) = (origin.as_dvec3(), direction.as_dvec3());
-        let across = DMat3::IDENTITY - DMat3::from_cols(along * along.x, along * along.y, along * along.z);
+        let across = DMat3::IDENTITY - outer(along, along);
         sum += across;
         at += across * origin;
     }
