@@ -9,6 +9,7 @@
 //! gradient with respect to `x`.
 
 use super::conic::LOW_PASS;
+use super::outer::outer;
 use super::projection::FRUSTUM_CLAMP;
 use super::{Harmonics, Model, Parameters, ShDirection, SliceSettings, rotation_4d};
 use crate::view::View;
@@ -259,11 +260,6 @@ impl Quaternion {
 /// −y, −x). This map is its own inverse, and its own transpose.
 fn at_rest(q: DVec4) -> DVec4 {
     DVec4::new(q.x, -q.w, -q.z, -q.y)
-}
-
-/// Returns `a bᵀ`.
-pub(crate) fn outer(a: DVec3, b: DVec3) -> DMat3 {
-    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
 }
 
 /// Returns the gradients with respect to the conditional covariance (symmetric) and the conditional mean: section 7.2

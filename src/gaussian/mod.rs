@@ -21,6 +21,7 @@ pub(crate) mod gradient;
 pub(crate) mod harmonics;
 pub(crate) mod importance;
 mod lifespan;
+pub(crate) mod outer;
 pub(crate) mod overlap;
 mod parameters;
 pub(crate) mod projection;

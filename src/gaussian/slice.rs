@@ -2,8 +2,8 @@
 //!
 //! In: raw [`Parameters`]. Out: one [`Gaussian`] each, activated, in capture space, computed in double precision.
 
-use super::gradient::outer;
 use super::lifespan::Lifespan;
+use super::outer::outer;
 use super::parameters::{Model, Parameters};
 use glam::{DMat3, DMat4, DQuat, DVec3, DVec4, Vec3};
 use rayon::prelude::*;

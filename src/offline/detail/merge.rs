@@ -15,8 +15,8 @@
 use crate::gaussian::alpha::{ALPHA_MAX, ALPHA_MIN};
 use crate::gaussian::axes::Axes;
 use crate::gaussian::conic::LOW_PASS;
-use crate::gaussian::gradient::outer;
 use crate::gaussian::harmonics::time_cosine;
+use crate::gaussian::outer::outer;
 use crate::gaussian::{Gaussian, Harmonics, Parameters, lifespan_reach};
 use crate::scene::{Sliced, Trained};
 use glam::{DMat3, DMat4, DVec3, DVec4};

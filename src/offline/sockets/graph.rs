@@ -9,7 +9,7 @@
 //! with the rotation R of each node. Points between nodes move with the nearest ones, as in Sumner and others,
 //! "Embedded Deformation for Shape Manipulation" (2007).
 
-use crate::gaussian::gradient::outer;
+use crate::gaussian::outer::outer;
 use glam::{DMat3, DQuat, DVec3};
 use rstar::RTree;
 use rstar::primitives::GeomWithData;

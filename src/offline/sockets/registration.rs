@@ -14,7 +14,7 @@
 
 use super::graph::{Graph, Pose, Pull, Skinned};
 use super::moment::{Feature, Moment};
-use crate::gaussian::gradient::outer;
+use crate::gaussian::outer::outer;
 use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 use rstar::RTree;

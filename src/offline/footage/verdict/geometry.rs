@@ -2,7 +2,7 @@
 //!
 //! In: cameras. Out: [`center`]: the point that they look at; [`Projector`]: the pixel of a point.
 
-use crate::gaussian::gradient::outer;
+use crate::gaussian::outer::outer;
 use crate::view::{Camera, Lens};
 use glam::{DMat3, DVec3, Mat4, UVec2, Vec2, Vec3};
 

@@ -6,7 +6,7 @@
 
 use super::error_peaks::Peak;
 use super::pinhole::Pinhole;
-use crate::gaussian::gradient::outer;
+use crate::gaussian::outer::outer;
 use crate::view::View;
 use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
