@@ -6,8 +6,9 @@
 //!
 //! Opacity is 0.1; the spatial scale is the root of the mean squared distance to the three nearest points, of the same
 //! time where there are many of each; the temporal scale is a share of the interval; no Gaussian is rotated or moves
-//! (section 5.4 of the 4DGS model). On request Gaussians have the velocities of their points, and those at points of
-//! what stands a temporal scale of three intervals.
+//! (section 5.4 of the 4DGS model). On request Gaussians have the velocities of their points, and scales by the nearest
+//! of the points that are drawn with them, where these have flown; and those at points of what stands have a temporal
+//! scale of three intervals.
 
 use super::error::StartError;
 use super::gaussians::{Looks, trained};

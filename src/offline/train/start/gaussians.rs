@@ -16,6 +16,10 @@ use std::collections::HashMap;
 const OPACITY: f32 = 0.1;
 /// Nearest points that give the scale.
 const NEAREST: usize = 3;
+/// Stretch of time whose points are compared where they are in its middle, in temporal scales.
+const STRETCH: f32 = 0.5;
+/// How long before and after that middle the points are from, in temporal scales.
+const DRAWN: f32 = 2.0;
 /// Value of the first spherical harmonic: a coefficient is `color − 0.5` divided by it.
 const SH_C0: f32 = 0.282_094_79;
 
@@ -44,9 +48,19 @@ pub(super) fn squares(places: &[[f32; 3]], least: f32) -> Vec<f32> {
     near.chunks_exact(NEIGHBORS).enumerate().map(square).collect()
 }
 
-/// Returns for each point the mean squared distance to the nearest others, at least `least`: to those of its time, if
-/// there are many of each time.
-fn squares_of(points: &[StartPoint], least: f32) -> Vec<f32> {
+/// Returns for each point the mean squared distance to the nearest others, at least `least`: among those with
+/// velocities, to those that are drawn at about its time, where they have flown until then.
+fn squares_of(points: &[StartPoint], looks: &Looks) -> Vec<f32> {
+    if points.iter().any(|point| point.velocity != Vec3::ZERO) {
+        squares_in_motion(points, looks)
+    } else {
+        squares_at_rest(points, looks.least)
+    }
+}
+
+/// Returns the mean squared distances of points without velocities: to others of the same time, if there are many of
+/// each time.
+fn squares_at_rest(points: &[StartPoint], least: f32) -> Vec<f32> {
     let mut of_time: HashMap<Option<u32>, Vec<usize>> = HashMap::new();
     for (index, point) in points.iter().enumerate() {
         of_time.entry((!point.stands).then(|| point.time.to_bits())).or_default().push(index);
@@ -64,12 +78,45 @@ fn squares_of(points: &[StartPoint], least: f32) -> Vec<f32> {
     squared
 }
 
+/// Returns the mean squared distances of points of which some have velocities. Those without are compared among
+/// themselves, the rest in stretches of time: with what is drawn in the middle of its stretch.
+fn squares_in_motion(points: &[StartPoint], looks: &Looks) -> Vec<f32> {
+    let stretch = STRETCH * looks.scale_t;
+    let (resting, mut moving): (Vec<usize>, Vec<usize>) =
+        (0..points.len()).partition(|&index| points[index].velocity == Vec3::ZERO);
+    let mut squared = vec![looks.least; points.len()];
+    let mut compare = |own: &[usize], others: &[usize], at: Option<f32>| {
+        let place = |&index: &usize| {
+            let StartPoint { position, time, velocity, .. } = points[index];
+            (position + at.map_or(Vec3::ZERO, |at| velocity * (at - time))).to_array()
+        };
+        let places: Vec<[f32; 3]> = own.iter().chain(others).map(place).collect();
+        own.iter().zip(squares(&places, looks.least)).for_each(|(&index, square)| squared[index] = square);
+    };
+    compare(&resting, &[], None);
+    moving.sort_by(|&a, &b| points[a].time.total_cmp(&points[b].time));
+    let time = |index: usize| points[moving[index]].time;
+    let mut begin = 0;
+    while begin < moving.len() {
+        let middle = time(begin) + stretch / 2.0;
+        let until = |limit: f32| moving.partition_point(|&index| points[index].time < limit);
+        // A stretch without a length has the points of one time.
+        let end = until(time(begin) + stretch).max(begin + 1);
+        let drawn = DRAWN * looks.scale_t;
+        let [first, last] = [until(middle - drawn).min(begin), until(middle + drawn).max(end)];
+        let others: Vec<usize> = moving[first..begin].iter().chain(&moving[end..last]).copied().collect();
+        compare(&moving[begin..end], &others, Some(middle));
+        begin = end;
+    }
+    squared
+}
+
 /// Returns Gaussians at these points.
 pub(super) fn trained(points: &[StartPoint], looks: &Looks) -> Trained {
-    let Looks { least, scale_t, standing_t, degree, degree_t } = *looks;
+    let Looks { scale_t, standing_t, degree, degree_t, .. } = *looks;
     let mean: Vec<[f32; 3]> = points.iter().map(|point| point.position.to_array()).collect();
     let count = points.len();
-    let begun = squares_of(points, least)
+    let begun = squares_of(points, looks)
         .into_iter()
         .zip(points)
         .map(|(square, point)| moving(square, if point.stands { standing_t } else { scale_t }, point.velocity));
@@ -128,14 +175,15 @@ mod tests {
         let velocities = [Vec3::ZERO, Vec3::new(3.0, -2.0, 0.5), Vec3::new(0.0, 0.0, -20.0), Vec3::X * 1e-3];
         let mut points = points(velocities.len());
         points.iter_mut().zip(velocities).for_each(|(point, velocity)| point.velocity = velocity);
-        let parameters = trained(&points, &Looks { scale_t: 0.1, ..LOOKS }).parameters;
+        let looks = Looks { scale_t: 0.1, ..LOOKS };
+        let parameters = trained(&points, &looks).parameters;
         let sliced = parameters.slice(&SliceSettings::default()).expect("valid parameters");
         for (index, (gaussian, velocity)) in sliced.iter().zip(velocities).enumerate() {
             let found = Vec3::from(gaussian.velocity);
             assert!(found.distance(velocity) < 1e-3 * (1.0 + velocity.length()), "{index}: {found}, not {velocity}");
             assert!((gaussian.sigma_t / 0.1 - 1.0).abs() < 1e-3, "{index}: temporal scale {}", gaussian.sigma_t);
             let trace = gaussian.covariance[0] + gaussian.covariance[3] + gaussian.covariance[5];
-            let expected = 3.0 * squares_of(&points, 1e-7)[index];
+            let expected = 3.0 * squares_of(&points, &looks)[index];
             assert!((trace / expected - 1.0).abs() < 0.01, "{index}: the shape does not depend on the velocity");
         }
     }
@@ -143,11 +191,59 @@ mod tests {
     #[test]
     fn distances_are_to_points_of_the_same_time() {
         let mut points = points(200);
-        let alone = squares_of(&points[..100], 1e-7);
+        let alone = squares_of(&points[..100], &LOOKS);
         let (first, second) = points.split_at_mut(100);
         for (point, of_first) in second.iter_mut().zip(first) {
             *point = StartPoint { time: 0.75, position: of_first.position + Vec3::X * 1e-3, ..*of_first };
         }
-        assert_eq!(squares_of(&points, 1e-7)[..100], alone, "as without the points of another time");
+        assert_eq!(squares_of(&points, &LOOKS)[..100], alone, "as without the points of another time");
+    }
+
+    /// Returns points of a thing that flies: two at each of 48 moments, on the other axis at each second moment.
+    fn flying(from: Vec3, velocity: Vec3) -> Vec<StartPoint> {
+        let point = |index: usize| {
+            let moment = index / 2;
+            let time = moment as f32 / 47.0;
+            let axis = [Vec3::Y, Vec3::Z][moment % 2];
+            let beside = if index.is_multiple_of(2) { axis } else { -axis } * 0.01;
+            let position = from + velocity * time + beside;
+            StartPoint { position, time, color: Vec3::splat(0.25), velocity, stands: false }
+        };
+        (0..96).map(point).collect()
+    }
+
+    #[test]
+    fn distances_of_what_flies_are_to_its_own_points_of_other_times() {
+        let looks = Looks { scale_t: 0.04, ..LOOKS };
+        let largest = |points: &[StartPoint]| squares_of(points, &looks).into_iter().fold(0.0, f32::max).sqrt();
+        let velocity = Vec3::new(3.0, -1.0, 0.0);
+        let two = [flying(Vec3::ZERO, velocity), flying(Vec3::new(2.0, 0.0, 0.0), velocity)].concat();
+        // Two points of each thing are seen at a moment, 0.02 apart; the next thing is two units away.
+        let found = largest(&two);
+        assert!(found < 0.02, "compared with points of the same thing: {found}");
+        let unknown: Vec<StartPoint> = two.iter().map(|point| StartPoint { velocity: Vec3::ZERO, ..*point }).collect();
+        let found = largest(&unknown);
+        assert!(found > 0.04, "without velocities the next moment's points are as far as it flew: {found}");
+    }
+
+    #[test]
+    fn what_rests_and_what_passed_long_before_do_not_count_for_what_flies() {
+        let looks = Looks { scale_t: 0.04, ..LOOKS };
+        let flying = flying(Vec3::ZERO, Vec3::X * 3.0);
+        let alone = squares_of(&flying, &looks);
+        let beside = |offset: f32, velocity: Vec3| {
+            flying.iter().map(move |point| StartPoint {
+                position: point.position + Vec3::Y * 1e-3,
+                time: point.time + offset,
+                velocity,
+                ..*point
+            })
+        };
+        let long_before: Vec<StartPoint> = flying.iter().copied().chain(beside(-1.5, Vec3::X * 3.0)).collect();
+        assert_eq!(squares_of(&long_before, &looks)[..96], alone, "beside what passed 1.5 intervals before");
+        let resting: Vec<StartPoint> = flying.iter().copied().chain(beside(0.0, Vec3::ZERO)).collect();
+        assert_eq!(squares_of(&resting, &looks)[..96], alone, "beside what rests");
+        let with_it: Vec<StartPoint> = flying.iter().copied().chain(beside(0.0, Vec3::X * 3.0)).collect();
+        assert_ne!(squares_of(&with_it, &looks)[..96], alone, "beside what flies with it");
     }
 }
