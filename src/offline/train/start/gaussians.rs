@@ -100,8 +100,8 @@ fn squares_in_motion(points: &[StartPoint], looks: &Looks) -> Vec<f32> {
     while begin < moving.len() {
         let middle = time(begin) + stretch / 2.0;
         let until = |limit: f32| moving.partition_point(|&index| points[index].time < limit);
-        // A stretch without a length has the points of one time.
-        let end = until(time(begin) + stretch).max(begin + 1);
+        // A stretch too short for single precision has the points of one time.
+        let end = until((time(begin) + stretch).max(time(begin).next_up()));
         let drawn = DRAWN * looks.scale_t;
         let [first, last] = [until(middle - drawn).min(begin), until(middle + drawn).max(end)];
         let others: Vec<usize> = moving[first..begin].iter().chain(&moving[end..last]).copied().collect();
@@ -224,6 +224,8 @@ mod tests {
         let unknown: Vec<StartPoint> = two.iter().map(|point| StartPoint { velocity: Vec3::ZERO, ..*point }).collect();
         let found = largest(&unknown);
         assert!(found > 0.04, "without velocities the next moment's points are as far as it flew: {found}");
+        let found = squares_of(&two, &Looks { scale_t: 0.0, ..looks })[0].sqrt();
+        assert!((found - 1.633).abs() < 0.01, "drawn for no time: the other thing's points of the moment: {found}");
     }
 
     #[test]
