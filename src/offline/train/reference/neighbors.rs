@@ -14,9 +14,14 @@ const LEAF: usize = 16;
 /// Returns the [`NEIGHBORS`] nearest points of each, one after the other: first itself, then by distance. If there are
 /// fewer points, the point itself fills the rest.
 pub fn neighbors(means: &[[f32; 3]]) -> Vec<u32> {
+    neighbors_of_first(means, means.len())
+}
+
+/// Returns those of the first `count` points alone, among all.
+pub fn neighbors_of_first(means: &[[f32; 3]], count: usize) -> Vec<u32> {
     let mut tree: Vec<u32> = (0..means.len() as u32).collect();
     arrange(means, &mut tree, 0);
-    let mut found = vec![0; means.len() * NEIGHBORS];
+    let mut found = vec![0; count * NEIGHBORS];
     found.par_chunks_exact_mut(NEIGHBORS).enumerate().for_each(|(index, own)| {
         let mut nearest = Nearest::new(means, index as u32);
         nearest.search(&tree, 0);

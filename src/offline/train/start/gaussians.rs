@@ -7,7 +7,7 @@ use super::point::StartPoint;
 use crate::gaussian::axes::moving;
 use crate::gaussian::harmonics::evaluated;
 use crate::gaussian::{Harmonics, Parameters};
-use crate::offline::train::reference::neighbors::{NEIGHBORS, neighbors};
+use crate::offline::train::reference::neighbors::{NEIGHBORS, neighbors_of_first};
 use crate::scene::Trained;
 use glam::Vec3;
 use std::collections::HashMap;
@@ -40,7 +40,12 @@ pub(super) struct Looks {
 
 /// Returns for each place the mean squared distance to the nearest others, at least `least`.
 pub(super) fn squares(places: &[[f32; 3]], least: f32) -> Vec<f32> {
-    let near = neighbors(places);
+    squares_of_first(places, places.len(), least)
+}
+
+/// Returns those of the first `count` places alone, among all.
+fn squares_of_first(places: &[[f32; 3]], count: usize, least: f32) -> Vec<f32> {
+    let near = neighbors_of_first(places, count);
     let square = |(index, own): (usize, &[u32])| {
         let square = |&other: &u32| Vec3::from(places[index]).distance_squared(Vec3::from(places[other as usize]));
         (own[1..=NEAREST].iter().map(square).sum::<f32>() / NEAREST as f32).max(least)
@@ -85,15 +90,16 @@ fn squares_in_motion(points: &[StartPoint], looks: &Looks) -> Vec<f32> {
     let (resting, mut moving): (Vec<usize>, Vec<usize>) =
         (0..points.len()).partition(|&index| points[index].velocity == Vec3::ZERO);
     let mut squared = vec![looks.least; points.len()];
-    let mut compare = |own: &[usize], others: &[usize], at: Option<f32>| {
+    let mut compare = |own: &[usize], others: [&[usize]; 2], at: f32| {
         let place = |&index: &usize| {
             let StartPoint { position, time, velocity, .. } = points[index];
-            (position + at.map_or(Vec3::ZERO, |at| velocity * (at - time))).to_array()
+            (position + velocity * (at - time)).to_array()
         };
-        let places: Vec<[f32; 3]> = own.iter().chain(others).map(place).collect();
-        own.iter().zip(squares(&places, looks.least)).for_each(|(&index, square)| squared[index] = square);
+        let places: Vec<[f32; 3]> = own.iter().chain(others.into_iter().flatten()).map(place).collect();
+        let own_squares = squares_of_first(&places, own.len(), looks.least);
+        own.iter().zip(own_squares).for_each(|(&index, square)| squared[index] = square);
     };
-    compare(&resting, &[], None);
+    compare(&resting, [&[]; 2], 0.0);
     moving.sort_by(|&a, &b| points[a].time.total_cmp(&points[b].time));
     let time = |index: usize| points[moving[index]].time;
     let mut begin = 0;
@@ -104,8 +110,7 @@ fn squares_in_motion(points: &[StartPoint], looks: &Looks) -> Vec<f32> {
         let end = until((time(begin) + stretch).max(time(begin).next_up()));
         let drawn = DRAWN * looks.scale_t;
         let [first, last] = [until(middle - drawn).min(begin), until(middle + drawn).max(end)];
-        let others: Vec<usize> = moving[first..begin].iter().chain(&moving[end..last]).copied().collect();
-        compare(&moving[begin..end], &others, Some(middle));
+        compare(&moving[begin..end], [&moving[first..begin], &moving[end..last]], middle);
         begin = end;
     }
     squared
