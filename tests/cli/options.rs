@@ -453,7 +453,7 @@ const ACCEPTED: &[&str] = &[
 /// The options of each verb that always have an effect, or are refused by their values alone.
 const ALWAYS: &[(&str, &[&str])] = &[
     ("info", &[]),
-    ("footage", &["--masks", "--out", "--rehearse", "--sync", "--test", "--work-size"]),
+    ("footage", &["--agreeing", "--masks", "--out", "--rehearse", "--smallest", "--sync", "--test", "--work-size"]),
     (
         "convert",
         &[

@@ -54,6 +54,10 @@ pub(crate) struct Footage {
     /// Longest side of the pictures that plates, masks and points are made from, pixels.
     #[arg(long, value_name = "PIXELS", default_value_t = FootageSettings::WORK_SIZE, value_parser = clap::value_parser!(u32).range(16..=8192))]
     work_size: u32,
+    /// Smallest part of a picture that is taken to move, as a share of the picture: smaller ones are taken for noise.
+    /// Things that fly may need 0.00002.
+    #[arg(long, value_name = "SHARE", default_value_t = FootageSettings::SMALLEST, value_parser = values::share)]
+    smallest: f64,
     /// Folder of masks of what moves, CAMERA/FRAME.png, white where something moves [default: seg or motion in FOLDER,
     /// if there is one; else what differs from the plates].
     #[arg(long, value_name = "MASKS")]
@@ -62,6 +66,10 @@ pub(crate) struct Footage {
     /// begin at random points; the same command without this option adds them.
     #[arg(long)]
     no_points: bool,
+    /// Least share of the cameras that show a place in whose masks it moves, for a point there: 0.75 where trees or walls
+    /// hide places from some cameras.
+    #[arg(long, value_name = "SHARE", default_value_t = FootageSettings::AGREEING, value_parser = values::share, conflicts_with = "no_points")]
+    agreeing: f64,
     /// Train shortly on the dataset without some of its cameras, so that the verdict tells what quality to expect: 1000
     /// steps of 30,000 Gaussians, on pictures of at most 320 pixels. Needs a GPU.
     #[arg(long, conflicts_with = "no_points")]
@@ -92,7 +100,7 @@ impl Footage {
     fn settings(&self) -> FootageSettings {
         let is_none = |names: &Vec<String>| names.len() == 1 && names[0] == NONE;
         let test = self.test.clone().map(|names| if is_none(&names) { Vec::new() } else { names });
-        let Self { folder, out, sync, offset, work_size, masks, no_points, rehearse, .. } = self;
+        let Self { folder, out, sync, offset, work_size, smallest, masks, no_points, agreeing, rehearse, .. } = self;
         FootageSettings {
             folder: folder.clone(),
             out: out.clone(),
@@ -100,8 +108,10 @@ impl Footage {
             offsets: offset.clone(),
             test,
             work_size: *work_size,
+            smallest: *smallest,
             masks: masks.clone(),
             points: !no_points,
+            agreeing: *agreeing,
             rehearse: *rehearse,
         }
     }

@@ -22,12 +22,17 @@ pub struct FootageSettings {
     pub test: Option<Vec<String>>,
     /// Longest side of the pictures that plates, masks and points are made from, pixels.
     pub work_size: u32,
+    /// Smallest part of a picture that is taken to move, as a share of the picture, 0 to 1.
+    pub smallest: f64,
     /// The folder of masks of what moves, `CAMERA/FRAME.png`; `None` takes `seg` or `motion` in the folder of the
     /// footage if there is one, and else tells what moves from the plates.
     pub masks: Option<PathBuf>,
     /// Whether points of every moment are looked for, which takes most of the time. Without them a training begins at
     /// random points.
     pub points: bool,
+    /// Least share, 0 to 1, of the cameras that show a place whose masks have it inside, for a point there: trees and
+    /// walls hide places from some.
+    pub agreeing: f64,
     /// Whether a short training on a GPU, without some of the cameras, tells the verdict what quality to expect.
     pub rehearse: bool,
 }
@@ -35,6 +40,10 @@ pub struct FootageSettings {
 impl FootageSettings {
     /// The usual longest side of the pictures to work with, pixels.
     pub const WORK_SIZE: u32 = 640;
+    /// The usual smallest part of a picture that is taken to move, as a share of the picture.
+    pub const SMALLEST: f64 = 0.0001;
+    /// The usual least share of the cameras that must agree on a place.
+    pub const AGREEING: f64 = 0.9;
 
     /// Returns the usual settings.
     pub fn usual(folder: PathBuf, out: PathBuf) -> Self {
@@ -46,8 +55,10 @@ impl FootageSettings {
             offsets: Vec::new(),
             test: None,
             work_size,
+            smallest: Self::SMALLEST,
             masks: None,
             points: true,
+            agreeing: Self::AGREEING,
             rehearse: false,
         }
     }

@@ -5,11 +5,11 @@
 
 use super::masking::{Names, read_mask, read_plate};
 use crate::offline::dataset::point_cloud::{CloudPoint, PointCloud};
-use crate::offline::footage::FootageError;
 use crate::offline::footage::colmap::{ColmapError, Program, triangulated};
 use crate::offline::footage::points::{Masked, Plate, TakePoints, moving_points, standing_points, write};
 use crate::offline::footage::take::{Filmed, Take};
 use crate::offline::footage::working::WorkingPictures;
+use crate::offline::footage::{FootageError, FootageSettings};
 use crate::offline::store::results::Key;
 use crate::offline::work::{FileError, Progress};
 use crate::scene::Origin;
@@ -41,8 +41,8 @@ pub(super) struct Cloud {
 }
 
 impl Cloud {
-    /// Finds points, and writes them. `known` are those that the footage comes with: if there are no plates, they
-    /// stand.
+    /// Finds points, and writes them into the folder of the dataset. `known` are those that the footage comes with: if
+    /// there are no plates, they stand.
     ///
     /// # Errors
     /// A picture or a file that cannot be read, a folder that cannot be written to, an interruption.
@@ -50,12 +50,13 @@ impl Cloud {
         seen: (&Take, &Names<'_>),
         working: &WorkingPictures,
         known: Option<&(PathBuf, Origin)>,
-        out: &Path,
+        settings: &FootageSettings,
         progress: &mut dyn Progress,
     ) -> Result<Self, FootageError> {
+        let out = &settings.out;
         let (take, path) = (seen.0, out.join(FILE));
         let standing = standing((take, working), known, out, progress)?;
-        let TakePoints { points } = TakePoints::joined(moving(seen, working, out, progress)?, standing);
+        let TakePoints { points } = TakePoints::joined(moving(seen, working, settings, progress)?, standing);
         if points.is_empty() {
             return Self::none(out);
         }
@@ -92,19 +93,19 @@ impl Cloud {
 fn moving(
     (take, names): (&Take, &Names<'_>),
     working: &WorkingPictures,
-    out: &Path,
+    settings: &FootageSettings,
     progress: &mut dyn Progress,
 ) -> Result<Vec<CloudPoint>, FootageError> {
     let cameras: Vec<Camera> = take.cameras.iter().map(|camera| camera.camera).collect();
     let masked = |camera: usize, moment: usize| -> Result<Option<Masked>, FootageError> {
         let Some(frame) = take.frame(camera, moment) else { return Ok(None) };
-        let Some(mask) = read_mask(out, &take.cameras[camera], frame, names)? else { return Ok(None) };
+        let Some(mask) = read_mask(&settings.out, &take.cameras[camera], frame, names)? else { return Ok(None) };
         Ok(Some(Masked { camera, picture: working.picture(&frame.view)?, mask }))
     };
     let mut load = |moment: usize| -> Result<Vec<Masked>, FootageError> {
         (0..take.cameras.len()).into_par_iter().filter_map(|camera| masked(camera, moment).transpose()).collect()
     };
-    moving_points(&cameras, &take.moments, &mut load, MOST_MOVING, progress)
+    moving_points(&cameras, &take.moments, &mut load, (MOST_MOVING, settings.agreeing as f32), progress)
 }
 
 /// Returns the points of what stands still: those that the plates show, else those that are known, else those that the

@@ -7,10 +7,10 @@
 
 use super::output::{Listed, Unfinished, listed};
 use crate::offline::dataset::TrainingView;
-use crate::offline::footage::FootageError;
 use crate::offline::footage::plates::{masks, plate};
 use crate::offline::footage::take::{Filmed, Frame, Take};
 use crate::offline::footage::working::WorkingPictures;
+use crate::offline::footage::{FootageError, FootageSettings};
 use crate::offline::work::{FileError, Progress, proceed};
 use image::{GrayImage, ImageError, RgbImage};
 use rayon::prelude::*;
@@ -110,9 +110,10 @@ pub(super) fn write_masks(
     (take, names): (&Take, &Names<'_>),
     working: &WorkingPictures,
     given: Option<&Given>,
-    out: &Path,
+    settings: &FootageSettings,
     progress: &mut dyn Progress,
 ) -> Result<Masked, FootageError> {
+    let out = &settings.out;
     let standing: Vec<&Filmed> = take.cameras.iter().filter(|camera| camera.frames.len() >= FEWEST).collect();
     let [plates, motion] = [Unfinished::begin(out, PLATES)?, Unfinished::begin(out, MOTION)?];
     progress.begin("plates and masks", standing.iter().map(|camera| camera.frames.len()).sum());
@@ -135,7 +136,7 @@ pub(super) fn write_masks(
             if !is_whole {
                 (pictures, known) = read(&frames.iter().collect::<Vec<_>>())?;
             }
-            let made = masks(&pictures, &plate).into_par_iter().zip(&known);
+            let made = masks(&pictures, &plate, settings.smallest as f32).into_par_iter().zip(&known);
             frames.par_iter().zip(made).try_for_each(|(frame, (mask, known))| -> Result<(), FootageError> {
                 let path = motion.path(&camera.name, &file_name(frame, names))?;
                 Ok(known.as_ref().unwrap_or(&mask).save(&path).map_err(|error| of_image(&path, error))?)

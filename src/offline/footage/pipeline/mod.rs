@@ -140,10 +140,10 @@ fn run(
     let seen_key = masks_key.with(Key::of_views(&source.views()));
     let is_there = |Text(cloud): &Text<Cloud>| cloud.is_in(out);
     let find = |progress: &mut dyn Progress| match settings.points {
-        true => Cloud::write(seen, &working, source.points.as_ref(), out, progress).map(Text),
+        true => Cloud::write(seen, &working, source.points.as_ref(), settings, progress).map(Text),
         false => Cloud::none(out).map(Text),
     };
-    let key = seen_key.and(&format!("{}", settings.points));
+    let key = seen_key.and(&format!("{} {}", settings.points, settings.agreeing));
     let (Text(cloud), cloud_key) = stages.run("points", key, is_there, find)?;
 
     let key = seen_key.with(cloud_key).and(&format!("{:?}", source.clock));
@@ -237,10 +237,11 @@ fn separate(
     let note = given.as_ref().filter(|_| !files.is_empty()).map(|given| given.note(files.len()));
     note.iter().for_each(|note| stages.progress().note(note));
     let paths: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
-    let key = pictures.with(Key::of_files(&paths)?).and(&format!("{} {paths:?}", settings.work_size));
+    let key =
+        pictures.with(Key::of_files(&paths)?).and(&format!("{} {} {paths:?}", settings.work_size, settings.smallest));
     let is_there = |Text(masked): &Text<Masked>| masked.is_in(out);
     let write =
-        |progress: &mut dyn Progress| masking::write_masks(seen, working, given.as_ref(), out, progress).map(Text);
+        |progress: &mut dyn Progress| masking::write_masks(seen, working, given.as_ref(), settings, progress).map(Text);
     let (Text(masked), _) = stages.run("plates", key, is_there, write)?;
     Ok((masked, key))
 }

@@ -23,19 +23,19 @@ const LIKELY: f32 = 4.0;
 const SURE: f32 = 6.0;
 /// Largest departure that counts, so that the mean does not widen what moves.
 const MOST: f32 = 9.0;
-/// Smallest part that moves, and largest hole in it, as shares of the picture.
-const SPECK: f32 = 0.0001;
+/// Largest hole in what moves, as a share of the picture.
 const HOLE: f32 = 0.01;
 /// Smallest place where the background is not known, and largest hole in it, as shares of the picture.
 const UNKNOWN_SPECK: f32 = 0.001;
 const UNKNOWN_HOLE: f32 = 0.015;
 
-/// Returns the masks of pictures. Each depends on its picture and the plate only, so that pictures may be given in
-/// parts. A picture of another size than the plate has a mask that knows nothing.
-pub(crate) fn masks(pictures: &[RgbImage], plate: &Plate) -> Vec<GrayImage> {
+/// Returns the masks of pictures, without parts that are smaller than this share of a picture. Each depends on its
+/// picture and the plate only, so that pictures may be given in parts. A picture of another size than the plate has a
+/// mask that knows nothing.
+pub(crate) fn masks(pictures: &[RgbImage], plate: &Plate, smallest: f32) -> Vec<GrayImage> {
     let reference = Reference::new(plate);
     let unknown = unknown(plate, &reference);
-    pictures.par_iter().map(|picture| mask(picture, &reference, &unknown)).collect()
+    pictures.par_iter().map(|picture| mask(picture, &reference, &unknown, smallest)).collect()
 }
 
 /// Returns the places where the background is not known: whole, with what lies between.
@@ -48,7 +48,7 @@ fn unknown(plate: &Plate, reference: &Reference<'_>) -> Vec<bool> {
 }
 
 /// Returns the mask of a picture.
-fn mask(picture: &RgbImage, reference: &Reference<'_>, unknown: &[bool]) -> GrayImage {
+fn mask(picture: &RgbImage, reference: &Reference<'_>, unknown: &[bool], smallest: f32) -> GrayImage {
     let (size, unit) = (reference.size, reference.unit);
     if UVec2::from(picture.dimensions()) != size {
         return GrayImage::from_pixel(picture.width(), picture.height(), Luma([UNKNOWN]));
@@ -59,7 +59,7 @@ fn mask(picture: &RgbImage, reference: &Reference<'_>, unknown: &[bool]) -> Gray
     let moving = seeded(&opened(&likely, size, unit), &sure, size);
     let all: Vec<bool> = moving.iter().zip(unknown).map(|(&moving, &unknown)| moving || unknown).collect();
     let whole = filled(closed(&all, size, 2 * unit), size, share(size, HOLE));
-    let whole = without_specks(&whole, size, share(size, SPECK));
+    let whole = without_specks(&whole, size, share(size, smallest));
     let inside = whole.iter().map(|&inside| f32::from(inside)).collect();
     let ramp = box_mean(inside, size, unit);
     let value = |index: usize| {
@@ -129,7 +129,7 @@ mod tests {
     #[test]
     fn a_mask_has_what_moves_and_not_its_shadow() {
         let pictures: Vec<_> = (0..20).map(scene).collect();
-        for (frame, mask) in (0..).zip(&masks(&pictures, &plate(&pictures, &[]))) {
+        for (frame, mask) in (0..).zip(&masks(&pictures, &plate(&pictures, &[]), 1e-4)) {
             let (mut both, mut either) = (0, 0);
             for (x, y, value) in mask.enumerate_pixels() {
                 let [own, true_one] = [value.0[0] >= 128, is_inside(frame, x, y, 20)];
@@ -143,17 +143,32 @@ mod tests {
     }
 
     #[test]
+    fn parts_below_the_smallest_share_are_left_out() {
+        let picture = |frame: u32| {
+            let is_there = |x: u32, y: u32| (10 * frame..10 * frame + 6).contains(&x) && (40..46).contains(&y);
+            let color = |x, y| if is_there(x, y) { 250 } else { 100 };
+            RgbImage::from_fn(128, 96, |x, y| Rgb([color(x, y); 3]))
+        };
+        let pictures: Vec<_> = (0..10).map(picture).collect();
+        let plate = plate(&pictures, &[]);
+        let inside =
+            |smallest: f32| masks(&pictures, &plate, smallest)[5].pixels().filter(|value| value.0[0] >= 128).count();
+        let (kept, dropped) = (inside(1e-4), inside(0.02));
+        assert!((20..120).contains(&kept) && dropped == 0, "a square of 36 pixels of 12,288: {kept}, {dropped}");
+    }
+
+    #[test]
     fn an_unknown_background_is_in_all_masks_but_not_surely() {
         let picture = |frame: u32| {
             RgbImage::from_fn(64, 64, |x, _| if x < 24 { Rgb([10 + 25 * frame as u8; 3]) } else { Rgb([150; 3]) })
         };
         let pictures: Vec<_> = (0..8).map(picture).collect();
         let plate = plate(&pictures, &[]);
-        let found = masks(&pictures, &plate);
+        let found = masks(&pictures, &plate, 1e-4);
         assert!(found.iter().all(|mask| mask.get_pixel(10, 30).0[0] >= 128), "nothing tells what is behind");
         assert!(found.iter().any(|mask| mask.get_pixel(10, 30).0[0] <= UNKNOWN), "nor what is not");
         assert!(found.iter().all(|mask| mask.get_pixel(40, 30).0 == [0]), "the rest stands still");
-        let other = masks(&[RgbImage::new(3, 2)], &plate);
+        let other = masks(&[RgbImage::new(3, 2)], &plate, 1e-4);
         assert!(other[0].pixels().all(|value| value.0 == [UNKNOWN]), "a picture of another size");
     }
 }

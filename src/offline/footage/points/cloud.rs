@@ -46,8 +46,9 @@ impl TakePoints {
 }
 
 /// Returns at most so many points of all moments together, on the surfaces of what moves. `times` are those of the
-/// moments, ascending; `load` returns the pictures of a moment. Cameras that look at no common place have no points.
-/// Begins the task "points of the moments".
+/// moments, ascending; `load` returns the pictures of a moment; `agreeing` is the least share of the cameras showing a
+/// place that have it inside their masks. Cameras that look at no common place have no points. Begins the task "points of
+/// the moments".
 ///
 /// # Errors
 /// Those of `load`; [`Interrupted`].
@@ -55,7 +56,7 @@ pub(crate) fn moving_points<E: From<Interrupted>>(
     cameras: &[Camera],
     times: &[f32],
     load: &mut dyn FnMut(usize) -> Result<Vec<Masked>, E>,
-    most: usize,
+    (most, agreeing): (usize, f32),
     progress: &mut dyn Progress,
 ) -> Result<Vec<CloudPoint>, E> {
     let Some(space) = Space::of(cameras) else { return Ok(Vec::new()) };
@@ -65,7 +66,7 @@ pub(crate) fn moving_points<E: From<Interrupted>>(
     progress.begin("points of the moments", times.len());
     for (index, &time) in times.iter().enumerate() {
         proceed(progress)?;
-        moments.push(points_at(cameras, load(index)?, &space, time, dense));
+        moments.push(points_at((cameras, &space), load(index)?, time, (dense, agreeing)));
         progress.advance();
     }
     progress.finish();
@@ -84,13 +85,18 @@ pub(crate) fn moving_points<E: From<Interrupted>>(
 }
 
 /// Returns the points of a moment. Pictures of a wrong size, or of no camera, are left out.
-fn points_at(cameras: &[Camera], masked: Vec<Masked>, space: &Space, time: f32, most: usize) -> MomentPoints {
+fn points_at(
+    (cameras, space): (&[Camera], &Space),
+    masked: Vec<Masked>,
+    time: f32,
+    (most, agreeing): (usize, f32),
+) -> MomentPoints {
     let silhouette = |Masked { camera, picture, mask }: Masked| {
         let silhouette = Silhouette::new(cameras.get(camera)?, &mask)?;
         (picture.dimensions() == mask.dimensions()).then_some((silhouette, picture))
     };
     let pictures: Vec<(Silhouette, RgbImage)> = masked.into_par_iter().filter_map(silhouette).collect();
-    let hull = Hull::of(pictures.iter().map(|(silhouette, _)| silhouette), space);
+    let hull = Hull::of(pictures.iter().map(|(silhouette, _)| silhouette), space, agreeing);
     MomentPoints::of(hull, &pictures, time, most)
 }
 
@@ -114,7 +120,8 @@ mod tests {
             };
             Ok(cameras.iter().enumerate().map(shown).collect())
         };
-        let points = moving_points(&cameras, &times, &mut load, 400, &mut NoProgress).expect("nobody interrupts");
+        let points =
+            moving_points(&cameras, &times, &mut load, (400, 0.9), &mut NoProgress).expect("nobody interrupts");
         assert!((200..=400).contains(&points.len()), "at most as many as allowed: {}", points.len());
         for time in times {
             let own: Vec<&CloudPoint> = points.iter().filter(|point| point.time == Some(time)).collect();

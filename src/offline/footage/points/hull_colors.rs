@@ -99,7 +99,7 @@ mod tests {
         };
         let pictures: Vec<(Silhouette, RgbImage)> = cameras.iter().map(picture).collect();
         let space = Space::of(&cameras).expect("cameras that look at the origin");
-        let hull = Hull::of(pictures.iter().map(|(silhouette, _)| silhouette), &space);
+        let hull = Hull::of(pictures.iter().map(|(silhouette, _)| silhouette), &space, 0.9);
         let chosen: Vec<usize> = (0..hull.cells.len()).collect();
         let found = colors(&hull, &pictures, &chosen);
         for (expected, side) in [(Vec3::X, 1.0), (Vec3::Y, -1.0)] {

@@ -23,8 +23,6 @@ const COARSE: u32 = 5;
 const FINEST: u32 = 12;
 /// Cubes of one size above which they are not halved further: masks that cover nearly everything say little.
 const MOST_CELLS: usize = 1 << 21;
-/// Least share of the cameras showing a place that have it inside their masks.
-const AGREEING: f32 = 0.9;
 /// Least number of cameras that show a place, if there are as many, and least share of all cameras.
 const FEWEST: usize = 3;
 const LEAST_SHARE: f32 = 0.25;
@@ -146,18 +144,19 @@ pub(crate) struct Hull {
 }
 
 impl Hull {
-    /// Returns the hull of these silhouettes of one moment.
-    pub(crate) fn of<'a>(silhouettes: impl Iterator<Item = &'a Silhouette>, space: &Space) -> Self {
+    /// Returns the hull of these silhouettes of one moment. `agreeing` is the least share of the cameras showing a place
+    /// that have it inside their masks.
+    pub(crate) fn of<'a>(silhouettes: impl Iterator<Item = &'a Silhouette>, space: &Space, agreeing: f32) -> Self {
         let silhouettes: Vec<&Silhouette> = silhouettes.collect();
         let fewest = FEWEST.min(silhouettes.len()).max((LEAST_SHARE * silhouettes.len() as f32).ceil() as usize).max(2);
         let is_kept = |evidence: &dyn Fn(&Silhouette) -> Evidence| {
-            let (mut shown, mut agreeing) = (0, 0);
+            let (mut shown, mut inside) = (0, 0);
             for &silhouette in &silhouettes {
                 let evidence = evidence(silhouette);
                 shown += usize::from(evidence != Evidence::Hidden);
-                agreeing += usize::from(evidence == Evidence::Possible);
+                inside += usize::from(evidence == Evidence::Possible);
             }
-            agreeing >= fewest && agreeing as f32 >= AGREEING * shown as f32
+            inside >= fewest && inside as f32 >= agreeing * shown as f32
         };
         let mut hull = Self { cells: cells::all(COARSE), side: 0.0, low: space.low };
         for level in COARSE..=space.levels {
@@ -194,11 +193,11 @@ mod tests {
     use super::super::fixture::{cameras, mask};
     use super::*;
 
-    fn hull(cameras: &[Camera], masks: impl Fn(usize, &Camera) -> GrayImage) -> Hull {
+    fn hull(cameras: &[Camera], agreeing: f32, masks: impl Fn(usize, &Camera) -> GrayImage) -> Hull {
         let silhouette = |(index, camera): (usize, &Camera)| Silhouette::new(camera, &masks(index, camera));
         let silhouettes: Vec<Silhouette> = cameras.iter().enumerate().filter_map(silhouette).collect();
         assert_eq!(silhouettes.len(), cameras.len(), "masks of the size of the pictures");
-        Hull::of(silhouettes.iter(), &Space::of(cameras).expect("cameras that look at the origin"))
+        Hull::of(silhouettes.iter(), &Space::of(cameras).expect("cameras that look at the origin"), agreeing)
     }
 
     #[test]
@@ -207,7 +206,7 @@ mod tests {
         let cameras = cameras(12);
         let balls = [(center, 0.3)];
         let missing = |index: usize, camera: &Camera| mask(camera, if index == 4 { &[] } else { &balls });
-        let found = hull(&cameras, missing);
+        let found = hull(&cameras, 0.9, missing);
         assert!(found.cells.len() > 500, "many cubes: {}", found.cells.len());
         for &cell in &found.cells {
             let far = found.place(cell).distance(center);
@@ -219,14 +218,22 @@ mod tests {
     fn a_ball_of_eight_pixels_is_found() {
         // A pixel at the center is 4 * 0.73 / 200 wide.
         let balls = [(Vec3::new(-0.6, 0.4, 0.3), 4.0 * 0.0146)];
-        let found = hull(&cameras(12), |_, camera| mask(camera, &balls));
+        let found = hull(&cameras(12), 0.9, |_, camera| mask(camera, &balls));
         assert!((40..400).contains(&found.cells.len()), "about a hundred cubes: {}", found.cells.len());
         let mean = found.cells.iter().map(|&cell| found.place(cell)).sum::<Vec3>() / found.cells.len() as f32;
         assert!(mean.distance(balls[0].0) < 0.015, "at its place: {mean}");
     }
 
     #[test]
+    fn a_ball_that_three_of_twelve_cameras_miss_is_found_if_three_quarters_suffice() {
+        let balls = [(Vec3::new(0.3, -0.2, 0.1), 0.1)];
+        let missing = |index: usize, camera: &Camera| mask(camera, if index < 3 { &[] } else { &balls });
+        let [most, fewer] = [0.9, 0.75].map(|agreeing| hull(&cameras(12), agreeing, missing).cells.len());
+        assert!(most == 0 && fewer > 100, "{most} cubes where nine tenths must agree, else {fewer}");
+    }
+
+    #[test]
     fn empty_masks_have_no_hull() {
-        assert_eq!(hull(&cameras(6), |_, camera| mask(camera, &[])).cells.len(), 0, "nothing is inside");
+        assert_eq!(hull(&cameras(6), 0.9, |_, camera| mask(camera, &[])).cells.len(), 0, "nothing is inside");
     }
 }
