@@ -58,7 +58,8 @@ pub(crate) struct SocketVerb {
     #[arg(long, conflicts_with_all = ["name", "at", "time", "rate", "out", "remove"])]
     list: bool,
     /// Compare sockets with the known tracks of the points in this file instead: the points.json of the film that SCENE
-    /// was trained on. Each is placed where the point is in the middle of the time. Nothing is written.
+    /// was trained on. Each is placed where the point is in the middle of the times at which it is known. Nothing is
+    /// written.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["name", "at", "time", "out", "remove", "list"])]
     points: Option<PathBuf>,
 }

@@ -1,10 +1,11 @@
 //! How far from known tracks points are that are followed.
 //!
-//! In: a capture, [`KnownPoint`]s. Out: a [`Comparison`]: each point is followed in both directions from its place
-//! nearest to the middle of the time interval; its distances from the known places, where it is lost, and how far the
-//! ways back miss the start.
+//! In: a capture, [`KnownPoint`]s. Out: a [`Comparison`]: each point is followed in both directions from the middle of
+//! the times at which it is known; its distances from the known places, where it is lost, and how far the ways back miss
+//! the start.
 //!
-//! A point is compared while it is there: from the gap in its track before the start to the gap after it.
+//! A point is compared while it is there: without the places beyond a gap in its track, of the stretch nearest to the
+//! middle of the time interval.
 
 use super::cloud::Cloud;
 use super::error::SocketError;
@@ -54,7 +55,7 @@ impl Compared {
 
 /// The known places of a point without a gap.
 struct Stretch {
-    /// The place nearest to the middle of the time interval, and its time.
+    /// The place nearest to the middle of their times, and its time.
     start: (f32, [f32; 3]),
     /// All places with their times.
     places: Vec<(f32, [f32; 3])>,
@@ -122,7 +123,8 @@ fn of_point(
 }
 
 impl Stretch {
-    /// Returns the places of a point around the middle of an interval of time; `None` if it has none in the interval.
+    /// Returns the places of a point without a gap nearest to the middle of an interval of time; `None` if it has none in
+    /// the interval.
     fn of(point: &KnownPoint, [first, last]: [f32; 2]) -> Option<Self> {
         let middle = first + 0.5 * (last - first);
         let far = |time: f32| (time - middle).abs();
@@ -135,8 +137,9 @@ impl Stretch {
         let stretch = stretches.min_by(|a, b| nearest(a).total_cmp(&nearest(b)))?;
         let places: Vec<(f32, [f32; 3])> =
             stretch.iter().filter_map(|(time, place)| Some((*time, (*place)?))).collect();
-        let start = *places.iter().min_by(|a, b| far(a.0).total_cmp(&far(b.0)))?;
         let interval = [places.first()?.0, places.last()?.0];
+        let off = |time: f32| (time - interval[0].midpoint(interval[1])).abs();
+        let start = *places.iter().min_by(|a, b| off(a.0).total_cmp(&off(b.0)))?;
         Some(Self { start, places, interval })
     }
 }
@@ -206,8 +209,8 @@ mod tests {
     fn a_point_is_compared_from_gap_to_gap_around_the_middle() {
         let there = |time: f64| (time < 0.1 || (0.55..0.76).contains(&time)).then(|| place(POINT, time));
         let (found, _) = compared(f64::INFINITY, known(there));
-        let [first, last] = [22.0, 30.0].map(|index: f64| (index / 40.0) as f32);
-        assert_eq!((found.time, found.interval, found.places), (first, [first, last], 9), "the nearest stretch alone");
+        let [first, middle, last] = [22.0, 26.0, 30.0].map(|index: f64| (index / 40.0) as f32);
+        assert_eq!((found.time, found.interval, found.places), (middle, [first, last], 9), "the nearest stretch alone");
         let (found, _) = compared(f64::INFINITY, known(|time| (time == 0.5).then(|| place(POINT, time))));
         assert_eq!((found.interval, found.largest, found.lost()), ([0.5; 2], Some(0.0), 0.0), "a single place");
     }

@@ -1,15 +1,17 @@
 //! Following a point through a capture.
 //!
-//! In: a capture, a [`Placement`]. Out: the track of its socket over the time of the capture ([`Followed`]): the shape
-//! around it is moved step by step, forward and backward from the time at which it was placed, and the point with it.
-//! From both ends of the track the way back is followed, with the shape that is there: how far it ends from the start
-//! is reported.
+//! In: a capture, a [`Placement`]. Out: the track of its socket over the time of the capture ([`Followed`]): the small
+//! thing that it is on, or the shape around it, is moved step by step, forward and backward from the time at which it
+//! was placed, and the point with it. From both ends of the track the way back is followed, with what is there: how far
+//! it ends from the start is reported.
 
 use super::cloud::Cloud;
 use super::error::SocketError;
 use super::look::Look;
 use super::moment::Moment;
+use super::part::Part;
 use super::shape::{SOLID, Shape};
+use super::small::Small;
 use crate::offline::work::{Progress, proceed};
 use crate::scene::{GaussianScene, Socket, SocketSample};
 use glam::{DQuat, DVec3, Quat, Vec3};
@@ -98,7 +100,7 @@ pub(super) fn follow_within(
     if !(first..=last).contains(&time) {
         return Err(SocketError::Outside { time, first, last });
     }
-    let (follower, shape) = Follower::placed(cloud, &start)?;
+    let (follower, part) = Follower::placed(cloud, &start)?;
     let times = moments([first, last], time, samples);
     let begin = Step { time: time.into(), place: place_of(&start), rotation: DQuat::IDENTITY, error: 0.0 };
     let ends = [first, last].map(f64::from);
@@ -106,7 +108,7 @@ pub(super) fn follow_within(
     progress.begin("following", 2 * ends.iter().map(|end| follower.steps(begin.time, *end)).sum::<usize>());
     let (mut lost, mut returns, mut tracks) = ([None; 2], [None; 2], [Vec::new(), Vec::new()]);
     for side in [0, 1] {
-        let walked = follower.walk(Some(shape.clone()), begin, ends[side], progress)?;
+        let walked = follower.walk(Some(part.clone()), begin, ends[side], progress)?;
         let mut track = sampled(&walked, &times[side]);
         let end = walked.last().copied().filter(|end| end.time != begin.time);
         if track.len() < times[side].len() {
@@ -117,8 +119,8 @@ pub(super) fn follow_within(
         }
         tracks[side] = track;
         let end = end.unwrap_or(begin);
-        let shape = Shape::around(cloud, end.place, end.time).filter(|_| end.time != begin.time);
-        let back = follower.walk(shape, end, begin.time, progress)?;
+        let there = part.again(cloud, end.place, end.time).filter(|_| end.time != begin.time);
+        let back = follower.walk(there, end, begin.time, progress)?;
         let arrived = back.last().filter(|step| end.time != begin.time && step.time == begin.time);
         returns[side] = arrived.map(|step| step.place.distance(begin.place) as f32);
         skip(follower.steps(end.time, ends[side]), progress);
@@ -149,8 +151,8 @@ fn moments([first, last]: [f32; 2], time: f32, samples: usize) -> [Vec<f32>; 2] 
 /// What is followed through.
 struct Follower<'a> {
     cloud: &'a Cloud,
-    /// What the point looked like when it was placed.
-    look: Look,
+    /// What the point looked like when it was placed; `None` of a small thing, which is lost where its Gaussians end.
+    look: Option<Look>,
 }
 
 /// Where the point is at a time.
@@ -165,12 +167,15 @@ struct Step {
 }
 
 impl<'a> Follower<'a> {
-    /// Returns the follower of a point, and the shape around it.
+    /// Returns the follower of a point, and what it is on.
     ///
     /// # Errors
     /// It is in the air, or too few Gaussians are near it.
-    fn placed(cloud: &'a Cloud, start: &SocketSample) -> Result<(Self, Shape<'a>), SocketError> {
+    fn placed(cloud: &'a Cloud, start: &SocketSample) -> Result<(Self, Part<'a>), SocketError> {
         let (place, time) = (place_of(start), f64::from(start.time));
+        if let Some(small) = Small::around(cloud, place, time) {
+            return Ok((Self { cloud, look: None }, Part::Small(small)));
+        }
         let reach = FARTHEST * cloud.size;
         let nothing = |distance: f64| SocketError::NothingThere { distance: distance as f32, time: start.time };
         let moment = Moment::of(cloud.drawn(time, Some([place - reach, place + reach])));
@@ -195,21 +200,21 @@ impl<'a> Follower<'a> {
         let around = (squares / sum).sqrt().max(LOOK * cloud.size);
         let look = Look::of(cloud.colors(place, time, around), around);
         let shape = Shape::around(cloud, place, time).ok_or_else(|| nothing(reach))?;
-        Ok((Self { cloud, look }, shape))
+        Ok((Self { cloud, look: Some(look) }, Part::Shape(shape)))
     }
 
-    /// Returns the steps of a shape from a place and a time to another time, or to the last one before the point is
-    /// lost; the start alone without a shape. Advances the task by [`steps`](Self::steps).
+    /// Returns the steps of a part from a place and a time to another time, or to the last one before the point is
+    /// lost; the start alone without a part. Advances the task by [`steps`](Self::steps).
     fn walk(
         &self,
-        shape: Option<Shape<'_>>,
+        part: Option<Part<'_>>,
         start: Step,
         end: f64,
         progress: &mut dyn Progress,
     ) -> Result<Vec<Step>, SocketError> {
         let (count, duration) = (self.steps(start.time, end), end - start.time);
         let mut walked = vec![start];
-        let Some(mut shape) = shape else {
+        let Some(mut part) = part else {
             skip(count, progress);
             return Ok(walked);
         };
@@ -220,9 +225,9 @@ impl<'a> Follower<'a> {
             while let Some((time, halvings)) = targets.pop() {
                 proceed(progress)?;
                 let before = walked.last().map_or(start.time, |step| step.time);
-                if shape.advance(time, halvings == 0) {
-                    let rotation = (shape.rotation() * start.rotation).normalize();
-                    walked.push(Step { time, place: shape.place(), rotation, error: shape.error() });
+                if part.advance(time, halvings == 0) {
+                    let rotation = (part.rotation() * start.rotation).normalize();
+                    walked.push(Step { time, place: part.place(), rotation, error: part.error() });
                 } else if let Some(halvings) = halvings.checked_sub(1) {
                     targets.extend([(time, halvings), (0.5 * (before + time), halvings)]);
                     continue;
@@ -230,7 +235,7 @@ impl<'a> Follower<'a> {
                     skip(count + 1 - step, progress);
                     return Ok(walked);
                 }
-                if !shape.is_held() || !walked.last().is_some_and(|step| self.is_there(step)) {
+                if !part.is_held() || !walked.last().is_some_and(|step| self.is_there(step)) {
                     walked.pop();
                     skip(count + 1 - step, progress);
                     return Ok(walked);
@@ -250,7 +255,8 @@ impl<'a> Follower<'a> {
     fn is_there(&self, step: &Step) -> bool {
         let Self { cloud, look, .. } = self;
         let is_sure = step.place.is_finite() && step.error <= LARGEST_ERROR * cloud.size;
-        is_sure && look.share(&cloud.colors(step.place, step.time, look.radius)) >= LEAST_SHARE
+        let is_alike = |look: &Look| look.share(&cloud.colors(step.place, step.time, look.radius)) >= LEAST_SHARE;
+        is_sure && look.as_ref().is_none_or(is_alike)
     }
 }
 

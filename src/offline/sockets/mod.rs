@@ -13,6 +13,8 @@
 //! | `graph` | a deformation graph of what is around a point, which moves as rigidly as it can |
 //! | `registration` | how what was drawn at the start is pulled to what is drawn at another time |
 //! | `shape` | graph and registration together: what is around a point, moved from time to time |
+//! | `small` | a small thing in the air around a point, moved from time to time |
+//! | `part` | what a point is on: a small thing or a shape |
 //! | `look` | the colors around a point, which tell whether what it was placed on is still there |
 //! | `follow` | the track of a point over the whole time of a capture, and the ways back |
 //! | `known_point` | points of a scene whose tracks are known, on disk |
@@ -29,8 +31,10 @@ mod known_point;
 mod look;
 mod means;
 mod moment;
+mod part;
 mod registration;
 mod shape;
+mod small;
 mod surface;
 
 pub use compare::{Compared, Comparison, compare};
