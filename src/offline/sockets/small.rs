@@ -69,7 +69,7 @@ impl<'a> Small<'a> {
     /// nothing, or on a part of something larger.
     pub(super) fn around(cloud: &'a Cloud, point: DVec3, time: f64) -> Option<Self> {
         let reach = REACH * cloud.size;
-        let near = around(cloud, point, time);
+        let near = drawn_around(cloud, point, time);
         let center = settled(cloud, &near, point, None)?;
         let (mut inside, mut beside) = (0.0, 0.0);
         for one in &near {
@@ -88,7 +88,7 @@ impl<'a> Small<'a> {
 
     /// Returns what a point is on at another time, at which it has been followed to there; `None` if that is nothing.
     pub(super) fn again(&self, point: DVec3, time: f64) -> Option<Self> {
-        let near = around(self.cloud, point, time);
+        let near = drawn_around(self.cloud, point, time);
         let center = settled(self.cloud, &near, point - self.offset, Some(self.center.velocity))?;
         Some(Self::of(self.cloud, center, point, time))
     }
@@ -102,7 +102,7 @@ impl<'a> Small<'a> {
     pub(super) fn advance(&mut self, time: f64) -> bool {
         let Self { cloud, center: Center { place, velocity, .. }, .. } = *self;
         let expected = place + velocity * (time - self.time);
-        let near = around(cloud, expected, time);
+        let near = drawn_around(cloud, expected, time);
         let settled = settled(cloud, &near, expected, Some(velocity));
         let is_near = |center: &Center| center.place.distance(expected) <= LONGEST_WAY * REACH * cloud.size;
         let Some(center) = settled.filter(is_near) else { return false };
@@ -127,7 +127,7 @@ impl<'a> Small<'a> {
 }
 
 /// Returns the Gaussians that are drawn at a time around a place.
-fn around(cloud: &Cloud, place: DVec3, time: f64) -> Vec<Drawn> {
+fn drawn_around(cloud: &Cloud, place: DVec3, time: f64) -> Vec<Drawn> {
     let half = DVec3::splat(FARTHEST * REACH * cloud.size);
     if place.is_finite() { cloud.drawn(time, Some([place - half, place + half])) } else { Vec::new() }
 }
