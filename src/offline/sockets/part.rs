@@ -1,6 +1,7 @@
 //! What a point is placed on, as it moves.
 //!
-//! In: a capture, a point at a time. Out: [`Part`]: a small thing in the air, or else the shape around the point.
+//! In: a small thing in the air, or the shape around a point, whichever `follow` has found. Out: [`Part`], which moves
+//! as either.
 
 use super::cloud::Cloud;
 use super::shape::Shape;
