@@ -213,6 +213,9 @@ fn folders_of_somebody_else_are_not_written_to() {
     gs4d(&arguments!["footage", &footage, "-o", &new, "--test", "0,1,2,3,4"]).must_fail("--test");
     gs4d(&arguments!["footage", &footage, "-o", &new, "--masks", folder.path()]).must_fail("1/000000.png");
     gs4d(&arguments!["footage", &out, "-o", &new]).must_fail("folders of frames");
+    for option in ["--smallest", "--agreeing"] {
+        gs4d(&arguments!["footage", &footage, "-o", &new, option, "-1"]).must_fail("expected a number from 0 to 1");
+    }
 }
 
 #[test]

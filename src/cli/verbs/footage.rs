@@ -56,7 +56,7 @@ pub(crate) struct Footage {
     work_size: u32,
     /// Smallest part of a picture that is taken to move, as a share of the picture: smaller ones are taken for noise.
     /// Things that fly may need 0.00002.
-    #[arg(long, value_name = "SHARE", default_value_t = FootageSettings::SMALLEST, value_parser = values::share)]
+    #[arg(long, value_name = "SHARE", default_value_t = FootageSettings::SMALLEST, value_parser = values::share, allow_negative_numbers = true)]
     smallest: f64,
     /// Folder of masks of what moves, CAMERA/FRAME.png, white where something moves [default: seg or motion in FOLDER,
     /// if there is one; else what differs from the plates].
@@ -68,7 +68,14 @@ pub(crate) struct Footage {
     no_points: bool,
     /// Least share of the cameras that show a place in whose masks it moves, for a point there: 0.75 where trees or walls
     /// hide places from some cameras.
-    #[arg(long, value_name = "SHARE", default_value_t = FootageSettings::AGREEING, value_parser = values::share, conflicts_with = "no_points")]
+    #[arg(
+        long,
+        value_name = "SHARE",
+        default_value_t = FootageSettings::AGREEING,
+        value_parser = values::share,
+        allow_negative_numbers = true,
+        conflicts_with = "no_points"
+    )]
     agreeing: f64,
     /// Train shortly on the dataset without some of its cameras, so that the verdict tells what quality to expect: 1000
     /// steps of 30,000 Gaussians, on pictures of at most 320 pixels. Needs a GPU.

@@ -1,10 +1,10 @@
 //! Points to begin a training with.
 //!
-//! In: a file of points: PLY (`x`, `y`, `z`, optionally `red`, `green`, `blue`, `time`, `vx`, `vy`, `vz`
-//! and `standing`), COLMAP's `points3D.bin` and
-//! `points3D.txt`, `points.npy` of Nerfies, or `init_pt_cld.npz` of `PanopticSports`; the origin of the views. Out: a
-//! [`PointCloud`]. Points whose place or time is not finite are left out. A count in a file is used only if the file
-//! has as many bytes.
+//! In: a file of points: PLY (`x`, `y`, `z`, optionally `red`, `green`, `blue`, `time`, `vx`, `vy`, `vz` and
+//! `standing`), COLMAP's `points3D.bin` and `points3D.txt`, `points.npy` of Nerfies, or `init_pt_cld.npz` of
+//! `PanopticSports`; the origin of the views. Out: a [`PointCloud`]. Points whose place or time is not finite are left
+//! out; velocities that are not finite or beyond all measure are none. A count in a file is used only if the file has
+//! as many bytes.
 
 pub use super::cloud_point::CloudPoint;
 
@@ -16,6 +16,9 @@ use crate::scene::Origin;
 use glam::Vec3;
 use std::fs;
 use std::path::Path;
+
+/// Velocity above which a point has none: in meters and seconds three times that of light.
+const MOST_SPEED: f32 = 1e9;
 
 /// Points, possibly none.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,7 +64,8 @@ fn ply(path: &Path, origin: &Origin) -> Result<Vec<CloudPoint>, DatasetError> {
         let time = time.filter(|_| !stands).map(|column| column.f64(index));
         let velocity = velocities.map_or(Vec3::ZERO, |columns| Vec3::from(columns.map(|column| column.f32(index))));
         let point = CloudPoint::counted_from(origin, places.map(|column| column.f64(index)), color, time);
-        CloudPoint { velocity: if velocity.is_finite() { velocity } else { Vec3::ZERO }, ..point }
+        let is_possible = velocity.is_finite() && velocity.abs().max_element() <= MOST_SPEED;
+        CloudPoint { velocity: if is_possible { velocity } else { Vec3::ZERO }, ..point }
     };
     Ok((0..table.len()).map(point).collect())
 }

@@ -88,4 +88,20 @@ mod tests {
         assert_eq!(found[0].velocity, moving.velocity, "its velocity");
         assert_eq!((found[1].time, found[1].velocity), (None, Vec3::ZERO), "a standing point has neither");
     }
+
+    #[test]
+    fn velocities_beyond_all_measure_are_read_as_none() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("points.ply");
+        let point = |speed: f32| CloudPoint {
+            position: Vec3::ONE,
+            color: None,
+            time: Some(0.5),
+            velocity: Vec3::new(0.0, -speed, 1.0),
+        };
+        write(&path, &[3e8, 1e30, f32::INFINITY].map(point), &Origin::default(), 0.5).expect("a writable folder");
+        let PointCloud(found) = PointCloud::load(&path, &Origin::default()).expect("a file that the dataset reads");
+        let velocities: Vec<Vec3> = found.iter().map(|point| point.velocity).collect();
+        assert_eq!(velocities, [Vec3::new(0.0, -3e8, 1.0), Vec3::ZERO, Vec3::ZERO], "that of light is one");
+    }
 }
