@@ -699,6 +699,8 @@ const ALWAYS: &[(&str, &[&str])] = &[
             "--steps",
             "--time-interval",
             "--time-scale",
+            "--timed-share",
+            "--untimed-scale",
             "--validation",
         ],
     ),

@@ -415,7 +415,7 @@ pub(crate) const RULES: &[Rule] = &[
     },
     Rule {
         need: Need::StartAtPoints,
-        options: &["--points"],
+        options: &["--points", "--timed-share", "--untimed-scale"],
         reason: "with --start hull or random, which begin without points",
     },
     Rule {

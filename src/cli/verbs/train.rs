@@ -139,6 +139,13 @@ pub(crate) struct Train {
     /// Begin with the velocities of points that have some.
     #[arg(long, help_heading = "Experimental", value_name = "SWITCH", default_value = "off", action = clap::ArgAction::Set, value_parser = values::switch())]
     start_velocity: bool,
+    /// Temporal scale of Gaussians at points without a time, beside points with one, at the beginning, as a share of the
+    /// time interval [default: that of --time-scale].
+    #[arg(long, help_heading = "Experimental", value_name = "SHARE", value_parser = time_scale)]
+    untimed_scale: Option<f64>,
+    /// Share of the Gaussians that begin at points with a time, beside points without, at most four at each.
+    #[arg(long, help_heading = "Experimental", value_name = "SHARE", default_value_t = StartSettings::default().timed_share, value_parser = values::share)]
+    timed_share: f64,
     /// Train on a quarter of the size of each side at first, then on half, where the longer side of pictures has more
     /// than 1000 pixels.
     #[arg(long, help_heading = "Experimental", value_name = "SWITCH", default_value = "off", action = clap::ArgAction::Set, value_parser = values::switch())]
@@ -302,6 +309,8 @@ impl Train {
             },
             start: if self.points.is_some() { Start::Points } else { self.start },
             time_scale: self.time_scale,
+            untimed_scale: self.untimed_scale,
+            timed_share: self.timed_share,
             velocities: self.start_velocity,
             standing: self.standing,
             seed: self.training.seed,

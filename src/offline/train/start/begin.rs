@@ -7,14 +7,14 @@
 //! Opacity is 0.1; the spatial scale is the root of the mean squared distance to the three nearest points, of the same
 //! time where there are many of each; the temporal scale is a share of the interval; no Gaussian is rotated or moves
 //! (section 5.4 of the 4DGS model). On request Gaussians have the velocities of their points, and scales by the nearest
-//! of the points that are drawn with them, where these have flown; and those at points of what stands have a temporal
-//! scale of three intervals.
+//! of the points that are drawn with them, where these have flown; those at points without a time, beside others with
+//! one, have a temporal scale of their own, or, as points of what stands, of three intervals.
 
 use super::error::StartError;
 use super::gaussians::{Looks, trained};
 use super::hull::hull;
 use super::measured::{GRAY, Measured, any_time, in_cube};
-use super::point::StartPoint;
+use super::point::{Life, StartPoint};
 use super::region::Region;
 use super::surroundings::{surroundings, usual_rows};
 use crate::offline::dataset::CoveredImage;
@@ -70,6 +70,11 @@ pub struct StartSettings {
     /// Temporal scale, as a share of the interval; `None`: a tenth, and at least the mean step between two moments of
     /// the images. The original's is `√(T/5)` for an interval of length `T`.
     pub time_scale: Option<f64>,
+    /// Temporal scale at points without a time, beside others with one, as a share of the interval; `None`: the same.
+    pub untimed_scale: Option<f64>,
+    /// Share of the Gaussians, 0 to 1, that begin at points with a time, beside others without one; at most four at
+    /// each. Default: 0.55.
+    pub timed_share: f64,
     /// Whether Gaussians begin with the velocities of their points. Default: `false`.
     pub velocities: bool,
     /// Whether points without a time, beside others with one, begin as Gaussians that stand still during the whole
@@ -93,6 +98,8 @@ impl Default for StartSettings {
             gaussians: 60_000,
             start: Start::Auto,
             time_scale: None,
+            untimed_scale: None,
+            timed_share: 0.55,
             velocities: false,
             standing: false,
             seed: 0,
@@ -127,8 +134,9 @@ pub fn begin(
     let (span, background) = (trained_with.time_span(), trained_with.background);
     let usual = || usual_time_scale(images.all_views().map(|view| view.time).collect());
     let scale_t = settings.time_scale.unwrap_or_else(usual) as f32 * span;
+    let untimed_t = settings.untimed_scale.map_or(scale_t, |scale| scale as f32 * span);
     let (degree, degree_t) = (settings.degree.min(3), if settings.degree >= 3 { settings.degree_t.min(2) } else { 0 });
-    let looks = Looks { least, scale_t, standing_t: STANDING_TIME_SCALE * span, degree, degree_t };
+    let looks = Looks { least, scale_t, untimed_t, standing_t: STANDING_TIME_SCALE * span, degree, degree_t };
     let scene = GaussianScene {
         form: SceneForm::Trained(trained(&points, &looks)),
         environment: (rows > 0).then(|| surroundings(background, rows)),
@@ -162,8 +170,8 @@ fn points(
 ) -> Result<(Vec<StartPoint>, Start), StartError> {
     let count = settings.gaussians;
     let mut random = Random::new(settings.seed);
-    let StartSettings { velocities, standing, .. } = *settings;
-    let measured = Measured { interval, least, velocities, standing };
+    let StartSettings { velocities, standing, timed_share, .. } = *settings;
+    let measured = Measured { interval, least, velocities, standing, timed_share };
     if settings.start == Start::Points {
         let PointCloud(own) = cloud.ok_or(StartError::NoPoints)?;
         return Ok((measured.points(own, count, &mut random), Start::Points));
@@ -203,7 +211,7 @@ fn points(
         time: any_time(interval, &mut random),
         color: Vec3::splat(GRAY),
         velocity: Vec3::ZERO,
-        stands: false,
+        life: Life::Timed,
     };
     Ok(((0..count).map(|_| point()).collect(), Start::Random))
 }

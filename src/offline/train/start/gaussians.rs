@@ -3,7 +3,7 @@
 //! In: points with colors, times and velocities, [`Looks`]. Out: Gaussians in the trained form, and the squared
 //! distances that their scales follow from.
 
-use super::point::StartPoint;
+use super::point::{Life, StartPoint};
 use crate::gaussian::axes::moving;
 use crate::gaussian::harmonics::evaluated;
 use crate::gaussian::{Harmonics, Parameters};
@@ -30,6 +30,8 @@ pub(super) struct Looks {
     pub least: f32,
     /// Temporal scale, in the unit of timestamps.
     pub scale_t: f32,
+    /// Temporal scale at points without a time, beside others with one.
+    pub untimed_t: f32,
     /// Temporal scale of what stands.
     pub standing_t: f32,
     /// Spatial degree of color, 0 to 3.
@@ -68,7 +70,7 @@ fn squares_of(points: &[StartPoint], looks: &Looks) -> Vec<f32> {
 fn squares_at_rest(points: &[StartPoint], least: f32) -> Vec<f32> {
     let mut of_time: HashMap<Option<u32>, Vec<usize>> = HashMap::new();
     for (index, point) in points.iter().enumerate() {
-        of_time.entry((!point.stands).then(|| point.time.to_bits())).or_default().push(index);
+        of_time.entry((point.life != Life::Whole).then(|| point.time.to_bits())).or_default().push(index);
     }
     let many = of_time.values().all(|of_time| of_time.len() > NEIGHBORS);
     let groups: Vec<Vec<usize>> =
@@ -118,13 +120,18 @@ fn squares_in_motion(points: &[StartPoint], looks: &Looks) -> Vec<f32> {
 
 /// Returns Gaussians at these points.
 pub(super) fn trained(points: &[StartPoint], looks: &Looks) -> Trained {
-    let Looks { scale_t, standing_t, degree, degree_t, .. } = *looks;
+    let Looks { scale_t, untimed_t, standing_t, degree, degree_t, .. } = *looks;
+    let temporal = |life: Life| match life {
+        Life::Timed => scale_t,
+        Life::Untimed => untimed_t,
+        Life::Whole => standing_t,
+    };
     let mean: Vec<[f32; 3]> = points.iter().map(|point| point.position.to_array()).collect();
     let count = points.len();
     let begun = squares_of(points, looks)
         .into_iter()
         .zip(points)
-        .map(|(square, point)| moving(square, if point.stands { standing_t } else { scale_t }, point.velocity));
+        .map(|(square, point)| moving(square, temporal(point.life), point.velocity));
     let begun: Vec<_> = begun.collect();
     let parameters = Parameters {
         mean_t: points.iter().map(|point| point.time).collect(),
@@ -148,14 +155,14 @@ mod tests {
     use super::*;
     use crate::gaussian::SliceSettings;
 
-    const LOOKS: Looks = Looks { least: 1e-7, scale_t: 0.4, standing_t: 3.0, degree: 3, degree_t: 2 };
+    const LOOKS: Looks = Looks { least: 1e-7, scale_t: 0.4, untimed_t: 0.6, standing_t: 3.0, degree: 3, degree_t: 2 };
 
     /// Returns points on a spiral, so that distances differ.
     fn points(count: usize) -> Vec<StartPoint> {
         let point = |index: usize| {
             let angle = index as f32 * 0.7;
             let position = Vec3::new(angle.cos(), angle.sin(), 0.1 * angle) * (1.0 + 0.01 * index as f32);
-            StartPoint { position, time: 0.5, color: Vec3::splat(0.25), velocity: Vec3::ZERO, stands: false }
+            StartPoint { position, time: 0.5, color: Vec3::splat(0.25), velocity: Vec3::ZERO, life: Life::Timed }
         };
         (0..count).map(point).collect()
     }
@@ -173,6 +180,16 @@ mod tests {
         assert_eq!((harmonics.coefficients, harmonics.is_consistent(700)), (48, true), "all degrees");
         let dc = harmonics.of(7)[0] * SH_C0 + 0.5;
         assert!((dc - 0.25).abs() < 1e-6 && harmonics.of(7)[3..].iter().all(|&value| value == 0.0), "gray: {dc}");
+    }
+
+    #[test]
+    fn the_temporal_scale_is_that_of_the_kind_of_point() {
+        let mut points = points(3);
+        points.iter_mut().zip([Life::Timed, Life::Untimed, Life::Whole]).for_each(|(point, life)| point.life = life);
+        let found: Vec<f32> = trained(&points, &LOOKS).parameters.log_scale_t.iter().map(|scale| scale.exp()).collect();
+        for (found, expected) in found.iter().zip([0.4, 0.6, 3.0]) {
+            assert!((found / expected - 1.0).abs() < 1e-5, "{found}, not {expected}");
+        }
     }
 
     #[test]
@@ -212,7 +229,7 @@ mod tests {
             let axis = [Vec3::Y, Vec3::Z][moment % 2];
             let beside = if index.is_multiple_of(2) { axis } else { -axis } * 0.01;
             let position = from + velocity * time + beside;
-            StartPoint { position, time, color: Vec3::splat(0.25), velocity, stands: false }
+            StartPoint { position, time, color: Vec3::splat(0.25), velocity, life: Life::Timed }
         };
         (0..96).map(point).collect()
     }

@@ -4,7 +4,7 @@
 //! the silhouettes of all views of its moment that show its place. Where a moment has few views (one, if the camera
 //! moves), views of moments nearby count too, with silhouettes that are widened, since things move between the moments.
 
-use super::point::StartPoint;
+use super::point::{Life, StartPoint};
 use super::region::Region;
 use crate::offline::dataset::CoveredImage;
 use crate::scene::random::Random;
@@ -61,7 +61,7 @@ pub(crate) fn hull(
                     // A random time closer to this moment than to others.
                     _ => silhouettes[index].time + (late - 0.5) * (interval[1] - interval[0]) / moments as f32,
                 };
-                Some(StartPoint { position, time, color, velocity: Vec3::ZERO, stands: false })
+                Some(StartPoint { position, time, color, velocity: Vec3::ZERO, life: Life::Timed })
             };
             (0..AT_ONCE).filter_map(candidate).collect::<Vec<_>>()
         };
