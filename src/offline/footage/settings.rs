@@ -30,8 +30,8 @@ pub struct FootageSettings {
     /// Whether points of every moment are looked for, which takes most of the time. Without them a training begins at
     /// random points.
     pub points: bool,
-    /// Least share, 0 to 1, of the cameras that show a place whose masks have it inside, for a point there: trees and
-    /// walls hide places from some.
+    /// Least share, 0 to 1, of the cameras that show a place whose masks have it inside, for a point there. Cameras in
+    /// which what stands hides the place, by the plates, do not count, if half of all have it inside.
     pub agreeing: f64,
     /// Whether a short training on a GPU, without some of the cameras, tells the verdict what quality to expect.
     pub rehearse: bool,

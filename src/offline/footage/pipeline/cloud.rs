@@ -6,7 +6,7 @@
 use super::masking::{Names, read_mask, read_plate};
 use crate::offline::dataset::point_cloud::{CloudPoint, PointCloud};
 use crate::offline::footage::colmap::{ColmapError, Program, triangulated};
-use crate::offline::footage::points::{Masked, Plate, TakePoints, moving_points, standing_points, write};
+use crate::offline::footage::points::{Backdrop, Masked, Plate, Standing, TakePoints, moving_points, standing, write};
 use crate::offline::footage::take::{Filmed, Take};
 use crate::offline::footage::working::WorkingPictures;
 use crate::offline::footage::{FootageError, FootageSettings};
@@ -55,8 +55,9 @@ impl Cloud {
     ) -> Result<Self, FootageError> {
         let out = &settings.out;
         let (take, path) = (seen.0, out.join(FILE));
-        let standing = standing((take, working), known, out, progress)?;
-        let TakePoints { points } = TakePoints::joined(moving(seen, working, settings, progress)?, standing);
+        let Standing { points, backdrops } = what_stands((take, working), known, out, progress)?;
+        let moving = moving((seen, &backdrops), working, settings, progress)?;
+        let TakePoints { points } = TakePoints::joined(moving, points);
         if points.is_empty() {
             return Self::none(out);
         }
@@ -89,9 +90,9 @@ impl Cloud {
     }
 }
 
-/// Returns the points of what moves.
+/// Returns the points of what moves. `backdrops` are what stands before the cameras.
 fn moving(
-    (take, names): (&Take, &Names<'_>),
+    ((take, names), backdrops): ((&Take, &Names<'_>), &[Backdrop]),
     working: &WorkingPictures,
     settings: &FootageSettings,
     progress: &mut dyn Progress,
@@ -105,28 +106,29 @@ fn moving(
     let mut load = |moment: usize| -> Result<Vec<Masked>, FootageError> {
         (0..take.cameras.len()).into_par_iter().filter_map(|camera| masked(camera, moment).transpose()).collect()
     };
-    moving_points(&cameras, &take.moments, &mut load, (MOST_MOVING, settings.agreeing as f32), progress)
+    moving_points((&cameras, backdrops), &take.moments, &mut load, (MOST_MOVING, settings.agreeing as f32), progress)
 }
 
-/// Returns the points of what stands still: those that the plates show, else those that are known, else those that the
-/// first pictures of the cameras show. If cameras are too far apart for that, by matches.
-fn standing(
+/// Returns what stands still: what the plates show, else the points that are known, else the points that the first
+/// pictures of the cameras show, which may also show what moves. If cameras are too far apart for that, by matches.
+fn what_stands(
     (take, working): (&Take, &WorkingPictures),
     known: Option<&(PathBuf, Origin)>,
     out: &Path,
     progress: &mut dyn Progress,
-) -> Result<Vec<CloudPoint>, FootageError> {
+) -> Result<Standing, FootageError> {
     let plate = |camera: &Filmed| -> Result<Option<Plate>, FootageError> {
         let of = |(picture, confidence)| Plate { camera: camera.camera, picture, confidence };
         Ok(read_plate(out, camera)?.map(of))
     };
     let mut plates: Vec<Plate> =
         take.cameras.par_iter().filter_map(|camera| plate(camera).transpose()).collect::<Result<_, _>>()?;
-    if plates.is_empty() {
+    let is_of_plates = !plates.is_empty();
+    if !is_of_plates {
         if let Some((path, origin)) = known {
             let mut points = PointCloud::load(path, origin)?.0;
             points.retain(|point| point.time.is_none());
-            return Ok(points);
+            return Ok(Standing { points, backdrops: Vec::new() });
         }
         let step = take.cameras.len().div_ceil(MOST_PICTURES).max(1);
         let cameras: Vec<&Filmed> = take.cameras.iter().step_by(step).collect();
@@ -138,11 +140,14 @@ fn standing(
         };
         plates = cameras.par_iter().filter_map(|camera| first(camera).transpose()).collect::<Result<_, _>>()?;
     }
-    let mut points = standing_points(&plates, MOST_STANDING, progress)?;
-    if points.len() < FEW {
-        points.extend(matched(plates, progress)?);
+    let mut found = standing(&plates, MOST_STANDING, progress)?;
+    if !is_of_plates {
+        found.backdrops.clear();
     }
-    Ok(points)
+    if found.points.len() < FEW {
+        found.points.extend(matched(plates, progress)?);
+    }
+    Ok(found)
 }
 
 /// Returns the points of matches of pictures that COLMAP finds; none if it is not installed or fails.

@@ -1,9 +1,10 @@
 //! The points of a take.
 //!
 //! In: cameras, the times of the moments, the masked pictures of each moment as they are needed, the points of what
-//! stands. Out: [`TakePoints`]: points with colors, times and velocities. Pictures of one moment are in memory at a
+//! stands, and what stands before the cameras. Out: [`TakePoints`]: points with colors, times and velocities. Pictures of one moment are in memory at a
 //! time.
 
+use super::backdrop::Backdrop;
 use super::moving_hull::{Hull, Silhouette, Space};
 use super::surface_points::MomentPoints;
 use super::velocity::velocities;
@@ -47,26 +48,28 @@ impl TakePoints {
 
 /// Returns at most so many points of all moments together, on the surfaces of what moves. `times` are those of the
 /// moments, ascending; `load` returns the pictures of a moment; `agreeing` is the least share of the cameras showing a
-/// place that have it inside their masks. Cameras that look at no common place have no points. Begins the task "points of
+/// place that have it inside their masks. Cameras that have a place behind one of the `backdrops` do not show it. Cameras that look at no common place have no points. Begins the task "points of
 /// the moments".
 ///
 /// # Errors
 /// Those of `load`; [`Interrupted`].
 pub(crate) fn moving_points<E: From<Interrupted>>(
-    cameras: &[Camera],
+    (cameras, backdrops): (&[Camera], &[Backdrop]),
     times: &[f32],
     load: &mut dyn FnMut(usize) -> Result<Vec<Masked>, E>,
     (most, agreeing): (usize, f32),
     progress: &mut dyn Progress,
 ) -> Result<Vec<CloudPoint>, E> {
     let Some(space) = Space::of(cameras) else { return Ok(Vec::new()) };
+    let before = |camera: &Camera| backdrops.iter().find(|backdrop| backdrop.camera == *camera);
+    let rig: Vec<(&Camera, Option<&Backdrop>)> = cameras.iter().map(|camera| (camera, before(camera))).collect();
     let each = most / times.len().max(1);
     let dense = DENSE.min(MOST_DENSE / times.len().max(1)).max(each);
     let mut moments = Vec::with_capacity(times.len());
     progress.begin("points of the moments", times.len());
     for (index, &time) in times.iter().enumerate() {
         proceed(progress)?;
-        moments.push(points_at((cameras, &space), load(index)?, time, (dense, agreeing)));
+        moments.push(points_at((&rig, &space), load(index)?, time, (dense, agreeing)));
         progress.advance();
     }
     progress.finish();
@@ -86,16 +89,17 @@ pub(crate) fn moving_points<E: From<Interrupted>>(
 
 /// Returns the points of a moment. Pictures of a wrong size, or of no camera, are left out.
 fn points_at(
-    (cameras, space): (&[Camera], &Space),
+    (rig, space): (&[(&Camera, Option<&Backdrop>)], &Space),
     masked: Vec<Masked>,
     time: f32,
     (most, agreeing): (usize, f32),
 ) -> MomentPoints {
     let silhouette = |Masked { camera, picture, mask }: Masked| {
-        let silhouette = Silhouette::new(cameras.get(camera)?, &mask)?;
+        let &(camera, backdrop) = rig.get(camera)?;
+        let silhouette = Silhouette::new(camera, &mask, backdrop)?;
         (picture.dimensions() == mask.dimensions()).then_some((silhouette, picture))
     };
-    let pictures: Vec<(Silhouette, RgbImage)> = masked.into_par_iter().filter_map(silhouette).collect();
+    let pictures: Vec<(Silhouette<'_>, RgbImage)> = masked.into_par_iter().filter_map(silhouette).collect();
     let hull = Hull::of(pictures.iter().map(|(silhouette, _)| silhouette), space, agreeing);
     MomentPoints::of(hull, &pictures, time, most)
 }
@@ -121,7 +125,7 @@ mod tests {
             Ok(cameras.iter().enumerate().map(shown).collect())
         };
         let points =
-            moving_points(&cameras, &times, &mut load, (400, 0.9), &mut NoProgress).expect("nobody interrupts");
+            moving_points((&cameras, &[]), &times, &mut load, (400, 0.9), &mut NoProgress).expect("nobody interrupts");
         assert!((200..=400).contains(&points.len()), "at most as many as allowed: {}", points.len());
         for time in times {
             let own: Vec<&CloudPoint> = points.iter().filter(|point| point.time == Some(time)).collect();

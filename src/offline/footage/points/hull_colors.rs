@@ -18,7 +18,7 @@ const BEHIND: f32 = 3.0;
 
 /// Returns the RGB color, 0 to 1, of the cubes with these indices; `None` where no picture shows one. Every silhouette
 /// has a picture of its size.
-pub(crate) fn colors(hull: &Hull, pictures: &[(Silhouette, RgbImage)], chosen: &[usize]) -> Vec<Option<Vec3>> {
+pub(crate) fn colors(hull: &Hull, pictures: &[(Silhouette<'_>, RgbImage)], chosen: &[usize]) -> Vec<Option<Vec3>> {
     let places: Vec<Vec3> = hull.cells.par_iter().map(|&cell| hull.place(cell)).collect();
     let maps: Vec<DepthMap> =
         pictures.par_iter().map(|(silhouette, _)| DepthMap::of(&silhouette.projection, &places, hull.side)).collect();
@@ -93,11 +93,11 @@ mod tests {
         let balls = [(Vec3::ZERO, 0.5)];
         // Cameras at positive y see red, others green.
         let picture = |camera: &Camera| {
-            let silhouette = Silhouette::new(camera, &mask(camera, &balls)).expect("the size of the camera");
+            let silhouette = Silhouette::new(camera, &mask(camera, &balls), None).expect("the size of the camera");
             let color = if silhouette.projection.eye.y > 0.0 { [255, 0, 0] } else { [0, 255, 0] };
             (silhouette, RgbImage::from_pixel(camera.size.x, camera.size.y, Rgb(color)))
         };
-        let pictures: Vec<(Silhouette, RgbImage)> = cameras.iter().map(picture).collect();
+        let pictures: Vec<(Silhouette<'_>, RgbImage)> = cameras.iter().map(picture).collect();
         let space = Space::of(&cameras).expect("cameras that look at the origin");
         let hull = Hull::of(pictures.iter().map(|(silhouette, _)| silhouette), &space, 0.9);
         let chosen: Vec<usize> = (0..hull.cells.len()).collect();

@@ -6,6 +6,7 @@
 //! | file | subject |
 //! |---|---|
 //! | `projection` | the pixel of a place and the place of a pixel |
+//! | `backdrop` | what stands before a camera, and hides what moves behind it |
 //! | `cells` | sets of cubes in Morton order: subdivision, surface, clusters |
 //! | `moving_hull` | the visual hull of the motion masks of a moment |
 //! | `hull_colors` | the colors of a hull |
@@ -18,6 +19,7 @@
 //! | `cloud` | all of this for a take |
 //! | `ply_file` | the file |
 
+mod backdrop;
 mod cells;
 mod cloud;
 mod filling;
@@ -33,6 +35,7 @@ mod surface_points;
 mod sweep;
 mod velocity;
 
+pub(crate) use backdrop::Backdrop;
 pub(crate) use cloud::{Masked, TakePoints, moving_points};
 pub(crate) use ply_file::write;
-pub(crate) use sweep::{Plate, standing_points};
+pub(crate) use sweep::{Plate, Standing, standing};

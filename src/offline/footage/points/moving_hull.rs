@@ -1,14 +1,15 @@
 //! The visual hull of the motion masks of a moment.
 //!
-//! In: the masks of several cameras at one moment, and the cube that the cameras look at. Out: [`Hull`]: the cubes at
-//! the surface of what is inside the masks. Cubes are halved as long as they may be inside, so that cubes of one and a
+//! In: the masks of several cameras at one moment, what stands before each camera, and the cube that the cameras look
+//! at. Out: [`Hull`]: the cubes at the surface of what is inside the masks where nothing that stands hides it. Cubes are halved as long as they may be inside, so that cubes of one and a
 //! half pixels are found in a space of several cameras' width: a ball of eight pixels has about a hundred.
 
+use super::backdrop::Backdrop;
 use super::cells;
 use super::projection::Projection;
 use crate::offline::train::start::region::Region;
 use crate::view::{Camera, RasterFov, View};
-use glam::{UVec3, Vec2, Vec3};
+use glam::{UVec2, UVec3, Vec2, Vec3};
 use image::GrayImage;
 use rayon::prelude::*;
 
@@ -26,6 +27,8 @@ const MOST_CELLS: usize = 1 << 21;
 /// Least number of cameras that show a place, if there are as many, and least share of all cameras.
 const FEWEST: usize = 3;
 const LEAST_SHARE: f32 = 0.25;
+/// Least share, of the cameras whose pictures show a place, that have it inside their masks, however many are hidden.
+const LEAST_SEEING: f32 = 0.5;
 /// Excess of the outline of a cube in a picture over that of a ball around it, for the border of the picture.
 const STRETCH: f32 = 1.25;
 
@@ -58,26 +61,38 @@ impl Space {
 }
 
 /// The mask of a camera, with the number of pixels inside in every rectangle from its first pixel.
-pub(crate) struct Silhouette {
+pub(crate) struct Silhouette<'a> {
     /// The camera.
     pub projection: Projection,
     sums: Vec<u32>,
+    backdrop: Option<&'a Backdrop>,
+}
+
+/// The part of a picture that shows a cube.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Footprint {
+    /// From the first pixel to before the last.
+    low: UVec2,
+    high: UVec2,
+    /// Largest depth of the cube, camera units.
+    depth: f32,
 }
 
 /// What a mask says of a cube.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 enum Evidence {
     /// The picture does not show the cube.
     Hidden,
     /// No part of the cube is inside.
-    Outside,
+    Outside(Footprint),
     /// A part of the cube may be inside.
     Possible,
 }
 
-impl Silhouette {
-    /// Returns a silhouette; `None` if the mask has another size than the pictures of the camera.
-    pub(crate) fn new(camera: &Camera, mask: &GrayImage) -> Option<Self> {
+impl<'a> Silhouette<'a> {
+    /// Returns a silhouette with what stands before the camera, if that is known; `None` if the mask has another size
+    /// than the pictures of the camera.
+    pub(crate) fn new(camera: &Camera, mask: &GrayImage, backdrop: Option<&'a Backdrop>) -> Option<Self> {
         if [mask.width(), mask.height()] != camera.size.to_array() {
             return None;
         }
@@ -90,7 +105,7 @@ impl Silhouette {
                 sums[(y + 1) * (width + 1) + x + 1] = sums[y * (width + 1) + x + 1] + count;
             }
         }
-        Some(Self { projection: Projection::of(camera), sums })
+        Some(Self { projection: Projection::of(camera), sums, backdrop })
     }
 
     /// Returns whether a pixel of the picture is inside.
@@ -115,10 +130,10 @@ impl Silhouette {
         if low.cmpge(size).any() || high.cmple(Vec2::ZERO).any() {
             return Evidence::Hidden;
         }
-        let pixels = [low.floor(), high.ceil()].map(|corner| corner.clamp(Vec2::ZERO, size).as_uvec2().to_array());
         let is_whole = low.cmpge(Vec2::ZERO).all() && high.cmple(size).all();
-        match self.count(pixels[0], pixels[1]) {
-            0 if is_whole => Evidence::Outside,
+        let [low, high] = [low.floor(), high.ceil()].map(|corner| corner.clamp(Vec2::ZERO, size).as_uvec2());
+        match self.count(low.to_array(), high.to_array()) {
+            0 if is_whole => Evidence::Outside(Footprint { low, high, depth: depth + radius }),
             _ => Evidence::Possible,
         }
     }
@@ -128,7 +143,7 @@ impl Silhouette {
         match self.projection.shown(center) {
             None => Evidence::Hidden,
             Some((pixel, _)) if self.is_inside(pixel.x, pixel.y) => Evidence::Possible,
-            Some(_) => Evidence::Outside,
+            Some((low, depth)) => Evidence::Outside(Footprint { low, high: low + 1, depth }),
         }
     }
 }
@@ -146,25 +161,44 @@ pub(crate) struct Hull {
 impl Hull {
     /// Returns the hull of these silhouettes of one moment. `agreeing` is the least share of the cameras showing a place
     /// that have it inside their masks.
-    pub(crate) fn of<'a>(silhouettes: impl Iterator<Item = &'a Silhouette>, space: &Space, agreeing: f32) -> Self {
-        let silhouettes: Vec<&Silhouette> = silhouettes.collect();
+    pub(crate) fn of<'a>(silhouettes: impl Iterator<Item = &'a Silhouette<'a>>, space: &Space, agreeing: f32) -> Self {
+        let silhouettes: Vec<&Silhouette<'_>> = silhouettes.collect();
         let fewest = FEWEST.min(silhouettes.len()).max((LEAST_SHARE * silhouettes.len() as f32).ceil() as usize).max(2);
-        let is_kept = |evidence: &dyn Fn(&Silhouette) -> Evidence| {
-            let (mut shown, mut inside) = (0, 0);
+        let is_kept = |evidence: &dyn Fn(&Silhouette<'_>) -> Evidence, hides: fn(&Backdrop, Footprint) -> bool| {
+            let (mut outside, mut inside) = (0, 0);
             for &silhouette in &silhouettes {
-                let evidence = evidence(silhouette);
-                shown += usize::from(evidence != Evidence::Hidden);
-                inside += usize::from(evidence == Evidence::Possible);
+                match evidence(silhouette) {
+                    Evidence::Hidden => {}
+                    Evidence::Outside(_) => outside += 1,
+                    Evidence::Possible => inside += 1,
+                }
             }
-            inside >= fewest && inside as f32 >= agreeing * shown as f32
+            let agree = |outside: usize| inside as f32 >= agreeing * (inside + outside) as f32;
+            if inside < fewest || agree(outside) {
+                return inside >= fewest;
+            }
+            // What stands is looked at only for cubes that depend on it, until too many cameras see that they are empty.
+            let mut empty = 0;
+            let is_empty = |silhouette: &Silhouette<'_>| match (evidence(silhouette), silhouette.backdrop) {
+                (Evidence::Outside(footprint), Some(backdrop)) => !hides(backdrop, footprint),
+                (evidence, _) => matches!(evidence, Evidence::Outside(_)),
+            };
+            let is_seen = inside as f32 >= LEAST_SEEING * (inside + outside) as f32;
+            is_seen
+                && silhouettes.iter().all(|silhouette| {
+                    empty += usize::from(is_empty(silhouette));
+                    agree(empty)
+                })
         };
+        let may_hide = |backdrop: &Backdrop, Footprint { low, high, depth }| backdrop.may_hide(low, high, depth);
+        let hides = |backdrop: &Backdrop, Footprint { low, depth, .. }| backdrop.hides(low, depth);
         let mut hull = Self { cells: cells::all(COARSE), side: 0.0, low: space.low };
         for level in COARSE..=space.levels {
             hull.side = space.voxel * (1u32 << (space.levels - level)) as f32;
             let radius = 0.5 * 3f32.sqrt() * hull.side;
             let may_be_inside = |cell: &u64| {
                 let center = hull.place(*cell);
-                is_kept(&|silhouette: &Silhouette| silhouette.evidence(center, radius))
+                is_kept(&|silhouette: &Silhouette<'_>| silhouette.evidence(center, radius), may_hide)
             };
             let kept: Vec<u64> = hull.cells.par_iter().copied().filter(may_be_inside).collect();
             if level == space.levels || kept.len() > MOST_CELLS {
@@ -175,7 +209,7 @@ impl Hull {
         }
         let is_inside = |cell: &u64| {
             let center = hull.place(*cell);
-            is_kept(&|silhouette: &Silhouette| silhouette.evidence_at(center))
+            is_kept(&|silhouette: &Silhouette<'_>| silhouette.evidence_at(center), hides)
         };
         let inside: Vec<u64> = hull.cells.par_iter().copied().filter(is_inside).collect();
         hull.cells = cells::surface(&inside);
@@ -194,8 +228,19 @@ mod tests {
     use super::*;
 
     fn hull(cameras: &[Camera], agreeing: f32, masks: impl Fn(usize, &Camera) -> GrayImage) -> Hull {
-        let silhouette = |(index, camera): (usize, &Camera)| Silhouette::new(camera, &masks(index, camera));
-        let silhouettes: Vec<Silhouette> = cameras.iter().enumerate().filter_map(silhouette).collect();
+        hull_behind(&[], cameras, agreeing, masks)
+    }
+
+    /// Returns the hull of masks, with what stands before the first cameras.
+    fn hull_behind(
+        backdrops: &[Backdrop],
+        cameras: &[Camera],
+        agreeing: f32,
+        masks: impl Fn(usize, &Camera) -> GrayImage,
+    ) -> Hull {
+        let silhouette =
+            |(index, camera): (usize, &Camera)| Silhouette::new(camera, &masks(index, camera), backdrops.get(index));
+        let silhouettes: Vec<Silhouette<'_>> = cameras.iter().enumerate().filter_map(silhouette).collect();
         assert_eq!(silhouettes.len(), cameras.len(), "masks of the size of the pictures");
         Hull::of(silhouettes.iter(), &Space::of(cameras).expect("cameras that look at the origin"), agreeing)
     }
@@ -230,6 +275,33 @@ mod tests {
         let missing = |index: usize, camera: &Camera| mask(camera, if index < 3 { &[] } else { &balls });
         let [most, fewer] = [0.9, 0.75].map(|agreeing| hull(&cameras(12), agreeing, missing).cells.len());
         assert!(most == 0 && fewer > 100, "{most} cubes where nine tenths must agree, else {fewer}");
+    }
+
+    #[test]
+    fn a_ball_that_a_wall_hides_from_five_of_twelve_cameras_is_found() {
+        let balls = [(Vec3::new(0.3, -0.2, 0.1), 0.1)];
+        let cameras = cameras(12);
+        let masks = |index: usize, camera: &Camera| mask(camera, if index < 5 { &[] } else { &balls });
+        // A wall over the whole picture, in the middle between camera and ball, and one far behind the ball.
+        let [before, behind] = [2.0, 9.0].map(|depth| {
+            let size = UVec2::new(25, 18);
+            let wall = |camera: &Camera| Backdrop::new(*camera, 8, size, &[depth; 450]);
+            let backdrops: Vec<Backdrop> = cameras[..5].iter().map(wall).collect();
+            hull_behind(&backdrops, &cameras, 0.9, masks).cells
+        });
+        assert_eq!(behind.len(), 0, "five cameras see that it is not there");
+        let seven = hull(&cameras[5..], 0.9, |_, camera| mask(camera, &balls));
+        assert!(before.len() > 100 && before.len() < 2 * seven.cells.len(), "as the others see it: {}", before.len());
+    }
+
+    #[test]
+    fn what_most_cameras_cannot_see_is_not_found() {
+        let balls = [(Vec3::new(0.3, -0.2, 0.1), 0.1)];
+        let cameras = cameras(12);
+        let wall = |camera: &Camera| Backdrop::new(*camera, 8, UVec2::new(25, 18), &[2.0; 450]);
+        let backdrops: Vec<Backdrop> = cameras[..7].iter().map(wall).collect();
+        let masks = |index: usize, camera: &Camera| mask(camera, if index < 7 { &[] } else { &balls });
+        assert_eq!(hull_behind(&backdrops, &cameras, 0.9, masks).cells.len(), 0, "five of twelve say little");
     }
 
     #[test]

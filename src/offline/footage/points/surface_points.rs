@@ -53,7 +53,7 @@ pub(crate) struct MomentPoints {
 
 impl MomentPoints {
     /// Returns at most so many points of a hull.
-    pub(crate) fn of(hull: Hull, pictures: &[(Silhouette, RgbImage)], time: f32, most: usize) -> Self {
+    pub(crate) fn of(hull: Hull, pictures: &[(Silhouette<'_>, RgbImage)], time: f32, most: usize) -> Self {
         let (numbers, count) = cells::clusters(&hull.cells);
         let mut cubes = vec![0; count];
         numbers.iter().for_each(|&number| cubes[number as usize] += 1);

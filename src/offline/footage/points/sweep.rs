@@ -1,10 +1,12 @@
 //! Depths of a picture that its neighbors agree with, as points.
 //!
-//! In: pictures of one moment, or plates of what stands, with their cameras. Out: colored points. For known pixels of
+//! In: pictures of one moment, or plates of what stands, with their cameras. Out: [`Standing`]: colored points, and what
+//! stands before each camera. For known pixels of
 //! every picture, the depth at which the pictures of the nearest cameras correlate best is kept if it is distinct, and
 //! if the depths of another picture agree. Pixels between them, such as those of a plain wall, get the mean of the
 //! depths around them: a Gaussian that begins near its wall finds it, and none hangs as fog before a camera.
 
+use super::backdrop::Backdrop;
 use super::filling::filled;
 use super::patch::GrayView;
 use crate::offline::dataset::point_cloud::CloudPoint;
@@ -48,18 +50,23 @@ pub(crate) struct Plate {
     pub confidence: GrayImage,
 }
 
-/// Returns at most so many points that the pictures show, without times. Begins the task "sweeping depths".
+/// What stands.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Standing {
+    /// Points without times.
+    pub points: Vec<CloudPoint>,
+    /// What stands before the cameras whose pictures show it.
+    pub backdrops: Vec<Backdrop>,
+}
+
+/// Returns what the pictures show, with at most so many points. Begins the task "sweeping depths".
 ///
 /// # Errors
 /// [`Interrupted`].
-pub(crate) fn standing_points(
-    plates: &[Plate],
-    most: usize,
-    progress: &mut dyn Progress,
-) -> Result<Vec<CloudPoint>, Interrupted> {
+pub(crate) fn standing(plates: &[Plate], most: usize, progress: &mut dyn Progress) -> Result<Standing, Interrupted> {
     let (views, shown): (Vec<GrayView>, Vec<&Plate>) =
         plates.iter().filter_map(|plate| Some((GrayView::new(&plate.camera, &plate.picture)?, plate))).unzip();
-    let Some((center, distance)) = subject(plates) else { return Ok(Vec::new()) };
+    let Some((center, distance)) = subject(plates) else { return Ok(Standing::default()) };
     let depths: Vec<f32> = (0..DEPTHS)
         .map(|index| {
             let share = index as f32 / (DEPTHS - 1) as f32;
@@ -76,17 +83,23 @@ pub(crate) fn standing_points(
         progress.advance();
     }
     progress.finish();
-    let (mut points, mut between) = (Vec::new(), Vec::new());
+    let (mut points, mut between, mut backdrops) = (Vec::new(), Vec::new(), Vec::new());
     for (index, (map, plate)) in maps.iter().zip(shown).enumerate() {
         let beside = near[index].iter().map(|&other| (&views[other], &maps[other]));
         let agreed = map.agreed(&views[index], &beside.collect::<Vec<_>>());
+        let others = filled(&agreed, map.size);
         points.extend(map.points(&views[index], plate, &agreed, 1));
-        between.extend(map.points(&views[index], plate, &filled(&agreed, map.size), OF_FILLED));
+        between.extend(map.points(&views[index], plate, &others, OF_FILLED));
+        // A cell has a depth of its own or one that is filled, never both.
+        let both: Vec<f32> = agreed.iter().zip(&others).map(|(own, filled)| own + filled).collect();
+        backdrops.push(Backdrop::new(plate.camera, map.step, map.size, &both));
     }
     points.extend(between);
     let count = points.len();
     let is_chosen = |index: usize| count <= most || index * most / count != (index + 1) * most / count;
-    Ok(points.into_iter().enumerate().filter(|(index, _)| is_chosen(*index)).map(|(_, point)| point).collect())
+    let points =
+        points.into_iter().enumerate().filter(|(index, _)| is_chosen(*index)).map(|(_, point)| point).collect();
+    Ok(Standing { points, backdrops })
 }
 
 /// Returns the place that the cameras look at, and their median distance from it, world space; `None` without one.
@@ -250,7 +263,7 @@ mod tests {
     #[test]
     fn a_sphere_is_found_by_the_depths_that_agree() {
         let plates: Vec<Plate> = (0..6).map(plate).collect();
-        let points = standing_points(&plates, 400, &mut NoProgress).expect("nobody interrupts");
+        let Standing { points, backdrops } = standing(&plates, 400, &mut NoProgress).expect("nobody interrupts");
         assert!(points.len() > 40, "many points: {}", points.len());
         assert!(points.len() <= 400, "at most as many as allowed: {}", points.len());
         let near = points.iter().filter(|point| (point.position.length() - 1.0).abs() < 0.1).count();
@@ -259,19 +272,30 @@ mod tests {
         let beside = points.iter().filter(|point| (point.position.length() - 1.0).abs() < 0.5).count();
         assert!(beside * 10 > points.len() * 9, "{beside} of {} are near the sphere", points.len());
         assert!(points.iter().all(|point| point.time.is_none()), "they stand");
+        assert_eq!(backdrops.len(), plates.len(), "what stands before each camera");
+        for backdrop in &backdrops {
+            let pixel = UVec2::new(48, 40);
+            assert!(
+                backdrop.hides(pixel, 4.0) && !backdrop.hides(pixel, 2.5),
+                "its center is hidden, what is before not"
+            );
+        }
     }
 
     #[test]
     fn what_is_not_known_has_no_points() {
         let unknown = |index: usize| Plate { confidence: GrayImage::new(96, 80), ..plate(index) };
         let plates: Vec<Plate> = (0..6).map(unknown).collect();
-        assert_eq!(standing_points(&plates, 400, &mut NoProgress).expect("nobody interrupts"), [], "nothing is known");
+        let found = standing(&plates, 400, &mut NoProgress).expect("nobody interrupts");
+        assert_eq!(found.points, [], "nothing is known");
+        assert!(!found.backdrops.iter().any(|backdrop| backdrop.hides(UVec2::new(48, 40), 9.0)), "nothing hides");
     }
 
     #[test]
     fn pictures_without_structure_have_no_points() {
         let plain = |index: usize| Plate { picture: RgbImage::new(96, 80), ..plate(index) };
         let plates: Vec<Plate> = (0..4).map(plain).collect();
-        assert_eq!(standing_points(&plates, 400, &mut NoProgress).expect("nobody interrupts"), [], "no structure");
+        let found = standing(&plates, 400, &mut NoProgress).expect("nobody interrupts");
+        assert_eq!(found.points, [], "no structure");
     }
 }
