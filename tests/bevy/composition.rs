@@ -208,7 +208,7 @@ fn every_design_draws_the_same_picture_among_meshes() {
     spawn(&mut app, &crowd(), ());
     spawn_flat_box(&mut app, Vec3::splat(0.3), Vec3::ZERO, Color::srgb(0.1, 0.6, 0.2));
     let camera = spawn_camera(&mut app, Msaa::Off, eye());
-    // Each variant of the tile bins takes a minute to compile on a software driver.
+    // Two of the variants: a software driver draws slowly by tile bins.
     for (msaa, depth) in [(Msaa::Off, DepthWrite::None), (Msaa::Sample4, DepthWrite::Expected)] {
         insert(&mut app, camera, msaa);
         let mut drawn = |design| {

@@ -5,7 +5,7 @@
 //! expected value. Skipped where there is no GPU.
 
 use crate::support::blob::blob;
-use crate::support::lent_gpu;
+use crate::support::gpu;
 use crate::support::surfaces::edge;
 use bevy_gs4d::gaussian::Harmonics;
 use bevy_gs4d::reference::{Layer, render_layers};
@@ -97,7 +97,7 @@ fn assert_shows(look: &Frame, plain: &Frame, what: &str) {
 
 #[test]
 fn appearances_match_the_cpu_reference() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let scene = scene();
     let plain = both(&mut headless, &scene, view(), Appearance::default(), BlendSpace::Encoded);
     assert_same(&plain, "as trained");
@@ -122,7 +122,7 @@ fn appearances_match_the_cpu_reference() {
 
 #[test]
 fn thinned_captures_match_the_cpu_reference() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let sliced = scene();
     let packed = sliced.clone().pack(&Packing::default()).expect("the scene fits");
     // Twice the median is above all Gaussians of the last layer: the passes do not read it.
@@ -142,7 +142,7 @@ fn thinned_captures_match_the_cpu_reference() {
 
 #[test]
 fn a_cropped_scene_is_the_scene_of_the_gaussians_inside() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let inside = [(Vec3::ZERO, 0.2, 0.9), (Vec3::new(0.3, 0.2, -0.3), 0.1, 0.7)];
     let outside = [(Vec3::new(0.7, 0.0, 0.0), 0.3, 0.8), (Vec3::new(0.0, 0.0, -0.9), 0.3, 0.8)];
     let all = blobs(&[inside[0], outside[0], inside[1], outside[1]]);
@@ -157,7 +157,7 @@ fn a_cropped_scene_is_the_scene_of_the_gaussians_inside() {
 
 #[test]
 fn linear_blending_averages_light() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     // A wide Gaussian of opacity one half: the middle pixel is the mean of its color and the background, in linear
     // light.
     let scene = blobs(&[(Vec3::ZERO, 4.0, 0.5)]);
@@ -169,7 +169,7 @@ fn linear_blending_averages_light() {
 
 #[test]
 fn orthographic_views_match_the_cpu_reference() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let scene = scene();
     for (near, shift) in [(0.0, Vec2::ZERO), (-5.0, Vec2::new(0.2, -0.1))] {
         let projection = Vec4::new(0.8, 1.2, shift.x, shift.y);
@@ -182,7 +182,7 @@ fn orthographic_views_match_the_cpu_reference() {
 
 #[test]
 fn size_does_not_depend_on_distance_in_orthographic_views() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     // Two equal Gaussians, one unit left and right of the axis, three and nine units away; 20 pixels per unit.
     let scene = blobs(&[(Vec3::new(-1.0, 0.0, 3.0), 0.3, 0.9), (Vec3::new(1.0, 0.0, 9.0), 0.3, 0.9)]);
     let scale = 2.0 * 20.0 / SIZE.as_vec2();
@@ -202,7 +202,7 @@ fn size_does_not_depend_on_distance_in_orthographic_views() {
 
 #[test]
 fn multisampled_surfaces_hide_a_fraction_of_a_pixel() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let (near, distance) = (0.1, 2.5);
     let (texture, column) = edge(headless.context(), SIZE, near, distance, 0.0);
     // Wide Gaussians in front of and behind the surface, which is 2.5 units away from a camera at the origin.
@@ -238,7 +238,7 @@ fn multisampled_surfaces_hide_a_fraction_of_a_pixel() {
 
 #[test]
 fn the_distance_of_a_surface_is_computed_for_every_projection() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let scene = blobs(&[(Vec3::Z * 2.0, 3.0, 0.5), (Vec3::Z * 4.0, 6.0, 0.6)]);
     let capture = headless.upload(&scene).expect("the scene fits the GPU");
     let (texture, _) = edge(headless.context(), SIZE, 0.25, 1.0, 0.0);
@@ -262,7 +262,7 @@ fn the_distance_of_a_surface_is_computed_for_every_projection() {
 
 #[test]
 fn debug_views_show_their_quantity() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let mut scene = blobs(&[(Vec3::new(-0.6, 0.0, 2.0), 0.2, 0.95), (Vec3::new(0.6, 0.0, 4.0), 0.4, 0.95)]);
     // The right Gaussian moves along +x and is present for a moment around time 0.5.
     let right = &mut scene.form.as_sliced_mut().expect("sliced").gaussians[1];
@@ -300,7 +300,7 @@ fn debug_views_show_their_quantity() {
 
 #[test]
 fn active_gaussians_that_are_absent_are_red_in_the_debug_view() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let mut scene = blobs(&[(Vec3::Z * 2.0, 0.4, 0.95)]);
     scene.form.as_sliced_mut().expect("sliced").gaussians[0].sigma_t = 0.05;
     let capture = headless.upload(&scene).expect("the scene fits the GPU");
@@ -320,7 +320,7 @@ fn active_gaussians_that_are_absent_are_red_in_the_debug_view() {
 
 #[test]
 fn anti_aliased_views_match_the_cpu_reference() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let scene = scene();
     let far = Camera::look_at(Vec3::new(9.0, 5.0, 4.0), Vec3::ZERO, Vec3::Z, 0.8, SIZE).view(0.4, RasterFov::default());
     let trained_pixel = Some(0.3 * far.camera_position.length() / far.focal().x);

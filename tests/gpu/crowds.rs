@@ -7,7 +7,6 @@
 use crate::render::{draw_frame, read_color};
 use crate::support::blob::blob;
 use crate::support::gpu;
-use crate::support::lent_gpu;
 use bevy_gs4d::gaussian::{Gaussian, Harmonics};
 use bevy_gs4d::reference;
 use bevy_gs4d::renderer::{Design, GpuCapture, Headless, Instance, Renderer, ViewRenderer};
@@ -78,7 +77,7 @@ fn expected(scene: &RuntimeScene, view: &View, count: usize) -> Frame {
 
 /// Draws a crowd in both designs with a fresh view each, and compares several frames with the CPU reference.
 fn check(count: usize) {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let scene = crowd(count, 0);
     let views = [0.0, 0.0, 0.01, 0.0].map(view);
     let [straight, aside] = [0, 2].map(|at| expected(&scene, &views[at], count));
@@ -114,7 +113,7 @@ fn a_tile_of_150_000_splats_matches_the_cpu_reference() {
 
 #[test]
 fn a_tile_of_many_splats_among_more_hidden_splats_matches_the_cpu_reference() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     // On software drivers, `blend` blends 64 splats in an iteration.
     let (scene, view) = (crowd(70_000, 800_000), view(0.0));
     let expected = expected(&scene, &view, 70_000);
@@ -127,7 +126,7 @@ fn a_tile_of_many_splats_among_more_hidden_splats_matches_the_cpu_reference() {
 /// A view without a client that checks its frames, as in Bevy.
 #[test]
 fn the_first_frames_of_a_view_without_counters_match_the_cpu_reference() {
-    let Some(headless) = lent_gpu::headless() else { return };
+    let Some(headless) = gpu::headless() else { return };
     let context = headless.context();
     let renderer = Renderer::new(&context.device, gpu::CHECKS).expect("the passes compile");
     let (scene, seen) = (crowd(45_000, 0), view(0.0));
@@ -147,7 +146,7 @@ fn the_first_frames_of_a_view_without_counters_match_the_cpu_reference() {
 
 #[test]
 fn small_scenes_are_drawn_in_tile_bins_on_every_driver() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     headless.set_design(Design::TileBins);
     let draw = |headless: &mut Headless, count: usize| {
         let capture = headless.upload(&crowd(count, 0)).expect("the scene fits");

@@ -3,8 +3,7 @@
 //! In: a synthetic scene, drawn with colors and without. Out: proof that depths and transmittance do not depend on
 //! colors, and that tile bins leave the colors out. Skipped where there is no GPU.
 
-use crate::support::gpu::CHECKS;
-use crate::support::lent_gpu;
+use crate::support::gpu::{self, CHECKS};
 use crate::support::texture_bytes::texture_bytes;
 use bevy_gs4d::renderer::{Design, GpuCapture, GpuContext, Instance, Renderer, ViewParameters, ViewRenderer};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
@@ -28,7 +27,7 @@ fn draw(context: &GpuContext, renderer: &Renderer, mut view: ViewRenderer, one: 
 
 #[test]
 fn depths_and_transmittance_do_not_depend_on_colors() {
-    let Some(headless) = lent_gpu::headless() else { return };
+    let Some(headless) = gpu::headless() else { return };
     let context = headless.context();
     let renderer = Renderer::new(&context.device, CHECKS).expect("the passes compile");
     let scene = synthesize(&SynthSettings { count: 2_000, ..SynthSettings::default() });

@@ -5,7 +5,6 @@
 
 use crate::render::draw_frame;
 use crate::support::gpu;
-use crate::support::lent_gpu;
 use bevy_gs4d::renderer::{Design, GpuCapture, Instance, Renderer, ViewRenderer};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::view::{Appearance, Background, Camera, RasterFov};
@@ -15,7 +14,7 @@ const FRAMES: usize = 8;
 
 #[test]
 fn counters_of_another_design_do_not_change_the_buffers_of_a_view() {
-    let Some(headless) = lent_gpu::headless() else { return };
+    let Some(headless) = gpu::headless() else { return };
     let context = headless.context();
     let renderer = Renderer::new(&context.device, gpu::CHECKS).expect("the passes compile");
     let mut scene =
@@ -57,7 +56,7 @@ fn counters_of_another_design_do_not_change_the_buffers_of_a_view() {
 
 #[test]
 fn the_buffers_of_passes_are_those_of_the_reference_design() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let scene = synthesize(&SynthSettings { count: 500, ..SynthSettings::default() }).into_runtime().expect("drawable");
     let capture = headless.upload(&scene).expect("the scene fits");
     let camera = Camera::look_at(Vec3::new(2.2, 1.1, 1.4), Vec3::ZERO, Vec3::Z, 0.8, UVec2::new(64, 48));

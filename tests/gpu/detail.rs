@@ -3,7 +3,7 @@
 //! In: a synthetic scene. Out: proof that a level has the promised PSNR in views in which it was neither trained nor
 //! measured, and that levels below the wanted PSNR are dropped. Skipped where there is no GPU.
 
-use crate::support::lent_gpu;
+use crate::support::gpu;
 use bevy_gs4d::gaussian::{Gaussian, Harmonics};
 use bevy_gs4d::internal::scene::pixels_across;
 use bevy_gs4d::offline::detail::{DetailError, DetailSettings, detail};
@@ -74,7 +74,7 @@ fn draw(headless: &mut Headless, scene: &RuntimeScene, view: &View) -> Frame {
 #[test]
 #[ignore = "takes minutes; `.ci/full` runs it by name"]
 fn a_level_has_the_promised_psnr_in_other_views() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let made = detail(&mut headless, clumps(), &QUICK, &mut NoProgress).expect("levels can be made");
     let [level] = &made.scene.levels[..] else { panic!("expected one level: {:?}", made.made) };
     assert_eq!(level.scene.len(), 20, "the level has a seventh of the Gaussians");
@@ -92,7 +92,7 @@ fn a_level_has_the_promised_psnr_in_other_views() {
 #[test]
 #[ignore = "takes minutes; `.ci/full` runs it by name"]
 fn training_increases_the_psnr_of_a_level() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let mut scene = clumps();
     let SceneForm::Ready(Form::Sliced(sliced)) = &mut scene.form else { panic!("the clumps are sliced") };
     sliced.gaussians.iter_mut().for_each(|gaussian| gaussian.opacity = 0.6);
@@ -109,7 +109,7 @@ fn training_increases_the_psnr_of_a_level() {
 
 #[test]
 fn levels_below_the_minimum_psnr_are_dropped() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let strict = DetailSettings { min_psnr: 300.0, directions: 1, times: 1, ..QUICK };
     let made = detail(&mut headless, clumps(), &strict, &mut NoProgress).expect("levels can be measured");
     assert!(made.scene.levels.is_empty() && made.made[0].pixels.is_none(), "no level has a PSNR of 300 dB");
@@ -118,7 +118,7 @@ fn levels_below_the_minimum_psnr_are_dropped() {
 
 #[test]
 fn scenes_with_environment_map_or_without_gaussians_have_no_levels() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let environment = Some(Environment { width: 1, height: 1, texels: vec![0.5; 3] });
     let around = GaussianScene { environment, ..clumps() };
     let refused = detail(&mut headless, around, &QUICK, &mut NoProgress);

@@ -3,7 +3,7 @@
 //! In: synthetic scenes with filters of both storage kinds. Out: proof that exactly the inactive Gaussians are not
 //! drawn. Skipped where there is no GPU.
 
-use crate::support::lent_gpu;
+use crate::support::gpu;
 use bevy_gs4d::reference;
 use bevy_gs4d::renderer::{Design, Headless, Instance, ViewParameters};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
@@ -57,7 +57,7 @@ fn draw(headless: &mut Headless, scene: &RuntimeScene, time: f32) -> Frame {
 
 #[test]
 fn a_filter_by_support_does_not_change_the_picture() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let whole = scene(5_000, 3);
     let filtered = with_support(&whole);
     let fraction = filtered.filter.as_ref().expect("a filter").active_share();
@@ -76,7 +76,7 @@ fn a_filter_by_support_does_not_change_the_picture() {
 
 #[test]
 fn inactive_gaussians_are_not_drawn() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let whole = scene(3_000, 5);
     // Every third Gaussian is active in even segments, all others in odd segments, which intervals cannot represent.
     let words = TemporalFilter::words(3_000);
@@ -111,7 +111,7 @@ fn inactive_gaussians_are_not_drawn() {
 
 #[test]
 fn copies_of_several_times_are_drawn_with_the_list_of_each() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let whole = scene(400, 9);
     let [plain, filtered] =
         [&whole, &with_support(&whole)].map(|scene| headless.upload(scene).expect("the scene fits the GPU"));
@@ -153,7 +153,7 @@ fn copies_of_several_times_are_drawn_with_the_list_of_each() {
 
 #[test]
 fn captures_with_and_without_a_filter_are_drawn_in_one_view() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let (a, b) = (scene(2_000, 7), scene(2_500, 8));
     let filtered = with_support(&a);
     let [plain, other, filtered] =
@@ -181,7 +181,7 @@ fn captures_with_and_without_a_filter_are_drawn_in_one_view() {
 
 #[test]
 fn the_capacity_of_a_view_is_the_maximum_of_active_gaussians() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let whole = scene(20_000, 8);
     // A ninth of the Gaussians in each segment.
     let words = TemporalFilter::words(20_000);

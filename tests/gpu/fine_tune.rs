@@ -5,7 +5,7 @@
 
 use crate::support::trained::{trained, trained_mut};
 use crate::support::training::{add_terms, round};
-use crate::support::{golden, lent_gpu};
+use crate::support::{golden, gpu};
 use bevy_gs4d::gaussian::{GradientMode, Harmonics, Parameters, SliceSettings};
 use bevy_gs4d::internal::gaussian::ParameterGradient;
 use bevy_gs4d::internal::offline::train::{
@@ -53,7 +53,7 @@ fn relative_error(found: &[f32], expected: &[f32]) -> f64 {
 
 #[test]
 fn gradients_match_the_original() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let mut compared = 0;
     for golden in golden::all_views() {
         let (scene_name, view_name) = golden.name.split_once('/').expect("scene and view");
@@ -112,7 +112,7 @@ fn gradients_match_the_original() {
 
 #[test]
 fn the_gradient_of_the_environment_map_matches_the_cpu_reference() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let Lesson { scene, views, .. } = Lesson::new(&mut headless);
     let random = |i: usize, seed: usize| ((i * seed + seed) % 61) as f32 / 61.0;
     let map = Environment { width: 24, height: 12, texels: (0..3 * 24 * 12).map(|i| random(i, 17)).collect() };
@@ -152,7 +152,7 @@ fn the_gradient_of_the_environment_map_matches_the_cpu_reference() {
 
 #[test]
 fn exposures_are_trained_as_in_the_cpu_reference() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new(&mut headless);
     let map = Environment { width: 4, height: 2, texels: (0..24).map(|i| i as f32 / 24.0).collect() };
     let around = GaussianScene { environment: Some(map), ..lesson.disturbed() };
@@ -309,7 +309,7 @@ fn covered(frame: &Frame, coverage: u8) -> CoveredImage {
 
 #[test]
 fn gradients_through_the_filter_of_mip_splatting_match_the_cpu_reference() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let Lesson { mut scene, views, .. } = Lesson::new(&mut headless);
     scene.trained_with.mip_filter = true;
     let parameters = &mut trained_mut(&mut scene).parameters;
@@ -349,7 +349,7 @@ fn gradients_through_the_filter_of_mip_splatting_match_the_cpu_reference() {
 
 #[test]
 fn the_loss_and_its_gradient_match_the_cpu_reference() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new(&mut headless);
     // Holes in the image show the background, or are masked.
     let mut image = lesson.images[0].clone();
@@ -396,7 +396,7 @@ fn the_loss_and_its_gradient_match_the_cpu_reference() {
 
 #[test]
 fn gradients_of_batches_add_up_and_each_view_has_its_share_of_its_batch() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new(&mut headless);
     let mut gradients = |batches: &[&[usize]]| {
         let mut trainer =
@@ -428,7 +428,7 @@ fn gradients_of_batches_add_up_and_each_view_has_its_share_of_its_batch() {
 
 #[test]
 fn no_more_steps_are_in_flight_than_their_bound() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let scene = Lesson::new(&mut headless).disturbed();
     // A picture that takes a software driver longer than the host takes to record a step.
     let camera = Camera::look_at(Vec3::new(2.4, 0.0, 1.2), Vec3::ZERO, Vec3::Z, 0.8, UVec2::new(320, 240));
@@ -480,7 +480,7 @@ fn terms([motion, rigid, opacity]: [f64; 3]) -> Terms {
 
 #[test]
 fn the_gradients_of_terms_match_the_cpu_reference() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let scene = Lesson::new(&mut headless).moving();
     let Trained { parameters, harmonics } = trained(&scene);
     let near = neighbors(&parameters.mean);
@@ -507,7 +507,7 @@ fn the_gradients_of_terms_match_the_cpu_reference() {
 
 #[test]
 fn fifty_steps_lower_each_term() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new(&mut headless);
     // The fraction of the term that may remain: a step changes each logit of opacity by at most 0.05.
     for ((term, weights), most) in TERMS.into_iter().zip([0.25, 0.25, 0.6]) {
@@ -534,7 +534,7 @@ fn fifty_steps_lower_each_term() {
 
 #[test]
 fn the_mask_term_removes_splats_outside_the_images() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new(&mut headless);
     let black = Background::Color([0.0; 3]);
     let mut left_after = |weight: f64| {
@@ -567,7 +567,7 @@ fn the_mask_term_removes_splats_outside_the_images() {
 
 #[test]
 fn neighbors_are_part_of_the_state() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new(&mut headless);
     let terms = Terms { rigid: 30.0, search_every: 8, ..Terms::default() };
     let mut train = |pause: Option<usize>| {
@@ -622,7 +622,7 @@ fn packed_pictures(headless: &mut Headless, scene: GaussianScene, views: &[View]
 
 #[test]
 fn rounded_geometry_is_drawn_as_in_the_packed_form() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new(&mut headless);
     let models: [(&str, fn(&mut Parameters)); 3] = [
         ("rotated", |_| {}),
@@ -666,7 +666,7 @@ fn rounded_geometry_is_drawn_as_in_the_packed_form() {
 #[test]
 #[ignore = "takes minutes; `.ci/full` runs it by name"]
 fn training_on_rounded_geometry_raises_the_psnr_of_the_packed_scene() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new(&mut headless);
     let steps = 120;
     let mut quality_after = |rounding: bool| {
@@ -700,7 +700,7 @@ fn training_on_rounded_geometry_raises_the_psnr_of_the_packed_scene() {
 
 #[test]
 fn the_roundings_of_geometry_are_part_of_the_state() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new(&mut headless);
     let mut train = |pause: Option<usize>| {
         let mut trainer =
@@ -728,7 +728,7 @@ fn the_roundings_of_geometry_are_part_of_the_state() {
 
 #[test]
 fn a_weight_that_is_not_a_number_is_refused() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new(&mut headless);
     let mut trainer =
         Trainer::new(&mut headless, lesson.scene.clone(), GradientMode::Exact).expect("the scene can be trained");
@@ -740,7 +740,7 @@ fn a_weight_that_is_not_a_number_is_refused() {
 
 #[test]
 fn a_step_matches_the_cpu_reference() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new(&mut headless);
     let mut trainer =
         Trainer::new(&mut headless, lesson.disturbed(), GradientMode::Exact).expect("the scene can be trained");
@@ -793,7 +793,7 @@ fn a_step_matches_the_cpu_reference() {
 
 #[test]
 fn fifty_steps_halve_the_loss_and_a_resumed_run_ends_as_an_uninterrupted_one() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new(&mut headless);
     let mut train = |pause: Option<usize>| {
         let mut trainer =
@@ -825,7 +825,7 @@ fn fifty_steps_halve_the_loss_and_a_resumed_run_ends_as_an_uninterrupted_one() {
 
 #[test]
 fn gradients_that_are_not_finite_are_left_out_and_reported() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new(&mut headless);
     let mut trainer =
         Trainer::new(&mut headless, lesson.scene.clone(), GradientMode::Exact).expect("the scene can be trained");
@@ -865,7 +865,7 @@ fn without_direction(lesson: &Lesson) -> (GaussianScene, View) {
 
 #[test]
 fn a_gaussian_whose_gradient_is_not_finite_is_left_out_with_its_color() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new(&mut headless);
     let (count, depths) = (70 * 54, vec![0.0; 70 * 54]);
     let mut strong = vec![[0.0; 4]; count];

@@ -6,7 +6,7 @@
 
 use crate::support::interrupting::Interrupting;
 use crate::support::trained::trained_mut;
-use crate::support::{dataset, lent_gpu};
+use crate::support::{dataset, gpu};
 use bevy_gs4d::gaussian::{GradientMode, Parameters};
 use bevy_gs4d::internal::offline::prune::select;
 use bevy_gs4d::internal::offline::store::{Key, Store};
@@ -83,7 +83,7 @@ fn filter(kind: FilterKind) -> TemporalFilter {
 
 #[test]
 fn gaussians_that_a_filter_leaves_out_are_not_trained() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new();
     assert_eq!(lesson.images.len(), 12, "the views of three of four cameras");
     let mut gradients = |scene: GaussianScene, view: &TrainingView| {
@@ -126,7 +126,7 @@ fn gaussians_that_a_filter_leaves_out_are_not_trained() {
 
 #[test]
 fn filters_by_views_are_computed_again_in_training_and_support_filters_after_it() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new();
     let mut run = |kind, refresh_filter| {
         let settings = FineTuneSettings { steps: 6, evaluate_every: 3, refresh_filter, ..FineTuneSettings::default() };
@@ -156,7 +156,7 @@ fn filters_by_views_are_computed_again_in_training_and_support_filters_after_it(
 
 #[test]
 fn colors_of_one_coefficient_are_compressed_without_codebooks() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new();
     let mut scene = lesson.disturbed(None);
     scene.form.truncate_colors(0, 0);
@@ -168,7 +168,7 @@ fn colors_of_one_coefficient_are_compressed_without_codebooks() {
 
 #[test]
 fn the_last_point_of_a_compressed_run_is_measured_on_the_compressed_scene() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new();
     let validation = Splits::open(
         &lesson.folder.path().join("data"),
@@ -200,7 +200,7 @@ fn the_last_point_of_a_compressed_run_is_measured_on_the_compressed_scene() {
 #[test]
 #[ignore = "takes minutes; `.ci/full` runs it by name"]
 fn an_interrupted_and_resumed_run_has_the_result_of_an_uninterrupted_one() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new();
     let settings = FineTuneSettings {
         steps: 8,
@@ -244,7 +244,7 @@ fn an_interrupted_and_resumed_run_has_the_result_of_an_uninterrupted_one() {
 
 #[test]
 fn the_last_steps_are_trained_on_rounded_geometry_only_if_requested() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new();
     let mut run = |rounding: bool, steps: usize| {
         let compress = Some((Quality::Small, steps));
@@ -258,7 +258,7 @@ fn the_last_steps_are_trained_on_rounded_geometry_only_if_requested() {
 
 #[test]
 fn captures_of_every_model_and_with_an_environment_map_are_trained() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let texels = (0..3 * 8 * 4).map(|i| i as f32 / 95.0).collect();
     let map = Environment { width: 8, height: 4, texels };
     let cases: [(&str, fn(&mut Parameters), Option<Environment>); 4] = [
@@ -298,7 +298,7 @@ fn captures_of_every_model_and_with_an_environment_map_are_trained() {
 
 #[test]
 fn images_that_are_read_when_they_are_needed_train_the_same_scene() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new();
     let settings = FineTuneSettings { steps: 20, evaluate_every: 10, ..FineTuneSettings::default() };
     let (validation, training) = lesson.views.split_at(4);
@@ -320,7 +320,7 @@ fn images_that_are_read_when_they_are_needed_train_the_same_scene() {
 
 #[test]
 fn validation_views_that_are_reproduced_exactly_do_not_keep_the_first_step() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new();
     let settings = FineTuneSettings { steps: 20, evaluate_every: 10, ..FineTuneSettings::default() };
     // Cameras that look away from the scene, with black images.
@@ -348,7 +348,7 @@ fn validation_views_that_are_reproduced_exactly_do_not_keep_the_first_step() {
 
 #[test]
 fn training_ends_early_when_it_no_longer_helps() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new();
     let rates = Rates {
         color: 0.0,

@@ -4,7 +4,7 @@
 //! sequence is that of its largest frame. Skipped where there is no GPU, or where the driver does not report its
 //! memory.
 
-use crate::support::lent_gpu;
+use crate::support::gpu;
 use crate::support::packed_scene::{BLACK, settings};
 use crate::support::skip::skip;
 use bevy_gs4d::internal::codec::{Export, Exporter};
@@ -51,7 +51,7 @@ struct Memory {
 
 /// Draws a scene at several times on a device of its own. Returns `None` without a GPU, or without its report.
 fn memory(scene: &RuntimeScene) -> Option<Memory> {
-    let mut headless = lent_gpu::headless()?;
+    let mut headless = gpu::headless()?;
     let capture = headless.upload(scene).expect("the scene fits the GPU");
     let [first, last] = scene.trained_with.time_interval;
     let camera = Camera::look_at(Vec3::new(2.0, -1.5, 1.2), Vec3::ZERO, Vec3::Z, 0.9, UVec2::new(160, 120));

@@ -3,14 +3,14 @@
 //! In: the scenes of `tests/golden/`. Out: proof that the GPU's pictures match the pictures of the original, with both
 //! designs of the renderer, and without subgroups. Skipped where there is no GPU.
 
-use crate::support::{golden, lent_gpu, limited_device};
+use crate::support::{golden, gpu, limited_device};
 use bevy_gs4d::renderer::{Design, Headless};
 
 /// On a software driver the largest differences are 1e-6 of color, 4e-6 of depth and 1e-6 of alpha, as on the CPU; and
 /// 4e-4 of color over an environment map, whose texel depends on the driver's inverse trigonometric functions.
 #[test]
 fn gpu_matches_the_original() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     for (name, design) in &Design::NAMES[1..] {
         compare_all_views(&mut headless, name, *design);
     }

@@ -6,7 +6,7 @@
 //! behind a wall are left out before they are sorted, and no others. Skipped where there is no GPU.
 
 use crate::support::composed::compose;
-use crate::support::lent_gpu;
+use crate::support::gpu;
 use crate::support::surfaces::{depth_texture, edge};
 use bevy_gs4d::internal::renderer::MULTISAMPLED;
 use bevy_gs4d::internal::renderer::{BIN_COUNTERS, FrameUniforms, SplatShape, VisibleSplat};
@@ -198,7 +198,7 @@ fn blend(context: &GpuContext, definitions: &[&str], surface: &wgpu::TextureView
 
 #[test]
 fn find_surfaces_finds_the_farthest_surface_of_each_tile() {
-    let Some(headless) = lent_gpu::headless() else { return };
+    let Some(headless) = gpu::headless() else { return };
     let context = headless.context();
     // The last row and column of tiles are not whole.
     let size = UVec2::new(75, 40);
@@ -227,7 +227,7 @@ fn find_surfaces_finds_the_farthest_surface_of_each_tile() {
 
 #[test]
 fn splats_that_surfaces_hide_are_left_out_before_they_are_sorted() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let scene = synthesize(&SynthSettings { count: 3_000, ..SynthSettings::default() });
     let scene = scene.into_runtime().expect("a scene that can be drawn");
     let capture = headless.upload(&scene).expect("the scene fits");
@@ -264,7 +264,7 @@ fn splats_that_surfaces_hide_are_left_out_before_they_are_sorted() {
 
 #[test]
 fn a_pixel_visits_no_batch_behind_its_surfaces() {
-    let Some(headless) = lent_gpu::headless() else { return };
+    let Some(headless) = gpu::headless() else { return };
     let context = headless.context();
     let large = context.device.limits().max_compute_workgroup_storage_size >= 32 * 1024;
     let variants = |batches: &'static [&'static str]| [&[][..], batches].into_iter().take(if large { 2 } else { 1 });

@@ -44,7 +44,6 @@ mod support {
     pub mod golden;
     pub mod gpu;
     pub mod interrupting;
-    pub mod lent_gpu;
     pub mod limited_device;
     pub mod no_gpu;
     #[cfg(target_os = "linux")]

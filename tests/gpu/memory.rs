@@ -3,7 +3,7 @@
 //! In: synthetic scenes, drawn at many times. Out: proof that a software driver, whose compiled shaders are in the
 //! memory of the process, compiles no shader after the first pictures. Skipped on hardware.
 
-use crate::support::lent_gpu;
+use crate::support::gpu;
 use crate::support::own_process::run_alone;
 use crate::support::packed_scene::{BLACK, scene, settings, view};
 use crate::support::skip::skip;
@@ -45,7 +45,7 @@ fn compiled_in_turn(headless: &mut Headless, scene: &RuntimeScene) -> [u64; 2] {
 fn a_software_driver_compiles_no_shader_after_the_first_pictures() {
     // In a separate process: other tests compile shaders at the same time.
     run_alone("memory::a_software_driver_compiles_no_shader_after_the_first_pictures", || {
-        let Some(mut headless) = lent_gpu::headless() else { return };
+        let Some(mut headless) = gpu::headless() else { return };
         if headless.context().info.device_type != wgpu::DeviceType::Cpu {
             return skip("the compiled code of hardware is not in the memory of the process");
         }

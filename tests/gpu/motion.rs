@@ -3,7 +3,7 @@
 //! In: moving scenes, seen from two places at two times. Out: proof that the GPU's motions match the CPU reference and
 //! the pinhole model, and that motions do not change colors. Skipped where there is no GPU.
 
-use crate::support::lent_gpu;
+use crate::support::gpu;
 use crate::support::packed_scene::{scene, settings};
 use bevy_gs4d::gaussian::{Gaussian, Harmonics};
 use bevy_gs4d::internal::reference::{self, TileLists};
@@ -43,7 +43,7 @@ fn expected(scene: &RuntimeScene, now: View, before: &View) -> Vec<(Vec2, f32)> 
 
 #[test]
 fn motion_matches_the_cpu_reference() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let whole = scene(3_000, 1, 0);
     let (packed, _) = compress(whole.clone(), &settings(&[16])).expect("the scene can be compressed");
     let packed = packed.into_runtime().expect("drawable");
@@ -79,7 +79,7 @@ fn motion_matches_the_cpu_reference() {
 
 #[test]
 fn motions_do_not_change_colors_and_depths() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let capture = headless.upload(&scene(3_000, 1, 0)).expect("the scene fits the GPU");
     let instances = [Instance { capture: &capture, active: None, view: view(0.0, 0.4), appearance: as_trained() }];
     let previous = [view(0.1, 0.3)];
@@ -118,7 +118,7 @@ fn lone() -> RuntimeScene {
 
 #[test]
 fn the_motion_of_a_splat_matches_the_pinhole_model() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let capture = headless.upload(&lone()).expect("the scene fits the GPU");
     let (size, distance) = (UVec2::splat(65), 3.0);
     let camera = |aside: f32| {
@@ -153,7 +153,7 @@ fn the_motion_of_a_splat_matches_the_pinhole_model() {
 
 #[test]
 fn resources_of_motions_are_created_once_and_only_for_frames_with_motions() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let capture = headless.upload(&lone()).expect("the scene fits the GPU");
     let view = view(0.0, 0.0);
     let instances = [Instance { capture: &capture, active: None, view, appearance: as_trained() }];

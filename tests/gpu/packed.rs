@@ -4,7 +4,7 @@
 //! codebooks share their buffer. Skipped where there is no
 //! GPU.
 
-use crate::support::lent_gpu;
+use crate::support::gpu;
 use crate::support::packed_scene::{BLACK, scene, settings, view};
 use bevy_gs4d::offline::compress::compress;
 use bevy_gs4d::reference;
@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 #[test]
 fn packed_scenes_match_the_cpu_reference() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     for (degree, degree_t, codebooks) in
         [(3, 2, &[64, 32, 16, 8][..]), (3, 2, &[]), (3, 1, &[50]), (2, 0, &[16, 16]), (1, 0, &[8]), (0, 0, &[2])]
     {
@@ -38,7 +38,7 @@ fn packed_scenes_match_the_cpu_reference() {
 
 #[test]
 fn captures_with_the_same_codebooks_share_their_buffer() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let (packed, _) = compress(scene(2_000, 3, 0), &settings(&[64, 32])).expect("compression succeeds");
     let first = packed.into_runtime().expect("drawable");
     let (second, mut other) = (first.clone(), first.clone());
@@ -64,7 +64,7 @@ fn coded(packed: &mut PackedScene, spoil: impl FnOnce(&mut CodedColors)) {
 
 #[test]
 fn inconsistent_packed_scenes_are_not_uploaded() {
-    let Some(headless) = lent_gpu::headless() else { return };
+    let Some(headless) = gpu::headless() else { return };
     let (packed, _) = compress(scene(600, 2, 0), &settings(&[16, 8])).expect("compression succeeds");
     let good = packed.into_runtime().expect("drawable");
     assert!(headless.upload(&good).is_ok(), "the undamaged scene is uploaded");

@@ -4,7 +4,7 @@
 //! picture of the whole scene bit for bit, in whichever order they come, after others had their pages and after the pages
 //! have moved; errors for files of other captures. Skipped where there is no GPU.
 
-use crate::support::lent_gpu;
+use crate::support::gpu;
 use bevy_gs4d::gaussian::Harmonics;
 use bevy_gs4d::renderer::{ChunkFiles, FileUpload, GpuCapture, GpuContext, GpuError, Headless};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
@@ -148,7 +148,7 @@ fn check(headless: &mut Headless, found: &GpuCapture, expected: &GpuCapture, wha
 
 #[test]
 fn files_in_pages_have_the_picture_of_the_whole_capture() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let sliced = scene();
     let packed = sliced.clone().pack(&Packing::default()).expect("the scene can be packed");
     let scenes = [
@@ -183,7 +183,7 @@ fn files_in_pages_have_the_picture_of_the_whole_capture() {
 
 #[test]
 fn pages_that_are_made_anew_keep_the_files() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let packed = scene().pack(&Packing::default()).expect("the scene can be packed");
     for scene in [with_filter(&scene(), 9, true), packed] {
         let mut files = Files::of(scene);
@@ -217,7 +217,7 @@ fn pages_that_are_made_anew_keep_the_files() {
 
 #[test]
 fn files_of_other_captures_are_refused() {
-    let Some(headless) = lent_gpu::headless() else { return };
+    let Some(headless) = gpu::headless() else { return };
     let files = Files::of(scene().pack(&Packing::default()).expect("the scene can be packed"));
     let mut capture = files.open(&headless, 6).expect("the pages fit the GPU");
     let add = |capture: &mut GpuCapture, number: usize, scene: &RuntimeScene| {

@@ -6,7 +6,7 @@
 use crate::support::surfaces::depth_texture;
 use crate::support::texture_bytes::texture_bytes;
 use crate::support::trained::trained_mut;
-use crate::support::{lent_gpu, limited_device, packed_scene};
+use crate::support::{gpu, limited_device, packed_scene};
 use bevy_gs4d::gaussian::{Gaussian, MARGINAL_CUTOFF, Parameters, SMALLEST_CUTOFF};
 use bevy_gs4d::internal::reference::{self, Splat};
 use bevy_gs4d::offline::compress::compress;
@@ -142,7 +142,7 @@ fn assert_equivalent(found: &Frame, expected: &Frame, what: &str) {
 
 #[test]
 fn frames_match_the_cpu_reference() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let scene = scene(3_000);
     let capture = headless.upload(&scene).expect("upload");
     for size in [UVec2::ONE, UVec2::new(17, 33), UVec2::new(70, 53), SIZE] {
@@ -160,7 +160,7 @@ fn frames_match_the_cpu_reference() {
 
 #[test]
 fn every_degree_of_color_matches_the_cpu_reference() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     for (degree, degree_t) in [(0, 0), (1, 0), (2, 0), (3, 0), (3, 1), (3, 2)] {
         let settings = SynthSettings { count: 500, degree, degree_t, ..SynthSettings::default() };
         let scene = synthesize(&settings).into_runtime().expect("a scene that can be drawn");
@@ -174,7 +174,7 @@ fn every_degree_of_color_matches_the_cpu_reference() {
 
 #[test]
 fn shader_checks_do_not_change_the_picture() {
-    let Some(mut checked) = lent_gpu::headless() else { return };
+    let Some(mut checked) = gpu::headless() else { return };
     let context = GpuContext::headless(None).expect("a device exists, as the line above shows");
     let mut unchecked = Headless::new(context, ShaderChecks::Off).expect("the passes compile");
     let (scene, view) = (scene(3_000), look_from(EYE, SIZE, 0.5));
@@ -187,7 +187,7 @@ fn shader_checks_do_not_change_the_picture() {
 
 #[test]
 fn frames_are_reproducible_bit_for_bit() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let (scene, view) = (scene(3_000), look_from(EYE, SIZE, 0.5));
     let capture = headless.upload(&scene).expect("upload");
     let first = headless.render(&capture, &view, BACKGROUND).expect("render");
@@ -198,7 +198,7 @@ fn frames_are_reproducible_bit_for_bit() {
 
 #[test]
 fn a_filter_applies_independent_of_earlier_frames() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let (all, view) = (scene(3_000), look_from(EYE, SIZE, 0.5));
     let every_other = (0..3_000).map(|i| if i % 2 == 0 { 0 } else { 1 }).collect();
     let sets = ActiveSets::Intervals(every_other);
@@ -222,7 +222,7 @@ fn a_filter_applies_independent_of_earlier_frames() {
 
 #[test]
 fn a_scene_without_gaussians_shows_the_background() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let empty = scene(0);
     let capture = headless.upload(&empty).expect("upload");
     let view = look_from(EYE, UVec2::new(33, 17), 0.5);
@@ -235,7 +235,7 @@ fn a_scene_without_gaussians_shows_the_background() {
 
 #[test]
 fn absent_and_transparent_gaussians_do_not_change_the_picture() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let (scene, view) = (scene(1_000), look_from(EYE, SIZE, 0.5));
     let capture = headless.upload(&scene).expect("upload");
     let alone = headless.render(&capture, &view, BACKGROUND).expect("render");
@@ -269,7 +269,7 @@ fn absent_and_transparent_gaussians_do_not_change_the_picture() {
 
 #[test]
 fn a_dynamic_scene_is_empty_at_distant_times() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let scene = scene(1_000);
     let capture = headless.upload(&scene).expect("upload");
     for time in [-1e6, 1e6] {
@@ -281,7 +281,7 @@ fn a_dynamic_scene_is_empty_at_distant_times() {
 
 #[test]
 fn the_cutoff_of_the_scene_decides_which_tails_are_drawn() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let view = look_from(EYE, UVec2::new(80, 60), 0.5);
     let mut visible = Vec::new();
     for cutoff in [SMALLEST_CUTOFF, MARGINAL_CUTOFF, 0.6] {
@@ -302,7 +302,7 @@ fn the_cutoff_of_the_scene_decides_which_tails_are_drawn() {
 
 #[test]
 fn a_small_scene_with_a_near_limit_and_the_filter_of_mip_splatting_matches_the_cpu_reference() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     const SCALE: f32 = 0.01;
     let mut scene = scaled(3_000, SCALE);
     (scene.trained_with.near, scene.trained_with.mip_filter) = (0.002, true);
@@ -323,7 +323,7 @@ fn a_small_scene_with_a_near_limit_and_the_filter_of_mip_splatting_matches_the_c
 
 #[test]
 fn parts_of_a_scene_drawn_together_equal_the_scene() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let (scene, view) = (scene(3_000), look_from(EYE, SIZE, 0.5));
     let whole = headless.upload(&scene).expect("upload");
     let whole = headless.render(&whole, &view, BACKGROUND).expect("render");
@@ -337,7 +337,7 @@ fn parts_of_a_scene_drawn_together_equal_the_scene() {
 
 #[test]
 fn captures_in_one_view_have_their_own_time_and_place() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let (first, second) = (scene(1_500), part(&scene(3_000), 1_500..3_000));
     let view = look_from(EYE, SIZE, 0.2);
     let model = Mat4::from_scale_rotation_translation(
@@ -355,7 +355,7 @@ fn captures_in_one_view_have_their_own_time_and_place() {
 
 #[test]
 fn a_capture_larger_than_a_binding_is_drawn_in_parts() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let Some(mut limited) = limited_device::headless() else { return };
     let (scene, view) = (scene(5_000), look_from(EYE, SIZE, 0.5));
     assert!(
@@ -372,7 +372,7 @@ fn a_capture_larger_than_a_binding_is_drawn_in_parts() {
 
 #[test]
 fn the_active_gaussians_of_a_capture_in_parts_are_those_of_the_whole() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let Some(mut limited) = limited_device::headless() else { return };
     let scene = packed_scene::scene(5_000, 3, 2);
     assert!(
@@ -420,7 +420,7 @@ fn afar_and_close() -> (RuntimeScene, View, View) {
 
 #[test]
 fn the_capacity_of_pairs_grows_for_a_close_view() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let (scene, afar, close) = afar_and_close();
     let capture = headless.upload(&scene).expect("upload");
     for (view, grows) in [(&afar, false), (&close, true), (&afar, false), (&close, true)] {
@@ -456,7 +456,7 @@ fn difference(context: &GpuContext, view: &ViewRenderer, expected: &Frame) -> f3
 
 #[test]
 fn frames_that_exceed_the_capacity_of_pairs_are_complete() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let (scene, _, close) = afar_and_close();
     let capture = headless.upload(&scene).expect("upload");
     let renderer = Renderer::new(&headless.context().device, ShaderChecks::On).expect("the passes compile");
@@ -491,11 +491,11 @@ fn frames_that_exceed_the_capacity_of_pairs_are_complete() {
 #[test]
 #[ignore = "takes minutes; `.ci/full` runs it by name"]
 fn frames_with_more_pairs_than_the_device_allows_are_complete() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let Some(mut limited) = limited_device::headless() else { return };
     let (scene, view) = (swollen(6_000, 10.0), look_from(EYE, UVec2::new(400, 300), 0.5));
     for design in [Design::GlobalSort, Design::TileBins] {
-        let [expected, found] = [(&mut *headless, 1), (&mut limited, 2)].map(|(headless, frames)| {
+        let [expected, found] = [(&mut headless, 1), (&mut limited, 2)].map(|(headless, frames)| {
             headless.set_design(design);
             let capture = headless.upload(&scene).expect("upload");
             vec![(); frames]
@@ -525,7 +525,7 @@ fn frames_with_more_pairs_than_the_device_allows_are_complete() {
 #[test]
 fn a_capture_uploaded_in_chunks_equals_a_capture_uploaded_at_once() {
     const CHUNK: u64 = 10_000;
-    let Some(headless) = lent_gpu::headless() else { return };
+    let Some(headless) = gpu::headless() else { return };
     let GpuContext { device, queue, .. } = headless.context();
     let renderer = Renderer::new(device, ShaderChecks::On).expect("the passes compile");
     let view = look_from(EYE, UVec2::new(64, 48), 0.4);
@@ -566,7 +566,7 @@ fn a_capture_uploaded_in_chunks_equals_a_capture_uploaded_at_once() {
 #[test]
 fn the_bytes_of_a_gaussian_are_known_before_it_is_uploaded() {
     const COUNT: usize = 5_000;
-    let Some(headless) = lent_gpu::headless() else { return };
+    let Some(headless) = gpu::headless() else { return };
     let GpuContext { device, queue, .. } = headless.context();
     let renderer = Renderer::new(device, ShaderChecks::On).expect("the passes compile");
     let bits = packed_scene::scene(COUNT, 3, 1);
@@ -592,7 +592,7 @@ fn the_bytes_of_a_gaussian_are_known_before_it_is_uploaded() {
 
 #[test]
 fn a_picture_that_grows_step_by_step_needs_few_new_buffers() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let scene = scene(500);
     let capture = headless.upload(&scene).expect("upload");
     for design in [Design::GlobalSort, Design::TileBins] {
@@ -627,7 +627,7 @@ pub fn read_color(context: &GpuContext, view: &ViewRenderer) -> Vec<[f32; 3]> {
 
 #[test]
 fn opaque_surfaces_hide_splats_behind_them() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let (scene, view) = (scene(3_000), look_from(EYE, SIZE, 0.5));
     let capture = headless.upload(&scene).expect("upload");
     let instances = [instance(&capture, &view)];
@@ -710,7 +710,7 @@ fn extreme(scale: f32, axes: usize) -> RuntimeScene {
 
 #[test]
 fn extreme_scales_do_not_produce_non_finite_pixels() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let view = look_from(EYE, SIZE, 0.5);
     for scale in [1e-20, 1e10, 1e18] {
         for axes in [1, 3] {

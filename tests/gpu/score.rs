@@ -2,7 +2,7 @@
 //!
 //! In: synthetic scenes. Out: proof that both return the same sums. Skipped where there is no GPU.
 
-use crate::support::lent_gpu;
+use crate::support::gpu;
 use bevy_gs4d::internal::offline::score::score;
 use bevy_gs4d::internal::offline::score::{GpuEngine, ScoreEngine, Want};
 use bevy_gs4d::renderer::ShaderChecks;
@@ -12,7 +12,7 @@ use glam::{UVec2, Vec3};
 
 #[test]
 fn score_matches_the_cpu_reference() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let settings = SynthSettings { count: 4_000, degree: 1, ..SynthSettings::default() };
     let scene = synthesize(&settings).into_runtime().expect("synthetic scenes are valid");
     let background = Background::Color([0.2, 0.4, 0.1]);

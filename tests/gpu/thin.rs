@@ -3,7 +3,7 @@
 //! In: slivers and needles, Gaussians near the limits of single precision. Out: proof that one rule decides what is
 //! drawn, and that the pictures are the same. Skipped where there is no GPU.
 
-use crate::support::lent_gpu;
+use crate::support::gpu;
 use crate::support::thin::{huge_scene, thin_scene, views};
 use bevy_gs4d::offline::measure::SquaredError;
 use bevy_gs4d::reference::render;
@@ -27,7 +27,7 @@ fn least_psnr(headless: &mut Headless, scene: &RuntimeScene, view: &View) -> [f6
 
 #[test]
 fn both_designs_draw_thin_splats_as_the_cpu_reference_does() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     for seed in 0..4 {
         let scene = thin_scene(seed, 400);
         for view in views() {
@@ -41,7 +41,7 @@ fn both_designs_draw_thin_splats_as_the_cpu_reference_does() {
 
 #[test]
 fn huge_splats_are_drawn_by_all_or_by_none() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     for view in views() {
         let [to_cpu, to_other] = least_psnr(&mut headless, &huge_scene(), &view);
         assert!(to_cpu > 80.0 && to_other > 80.0, "{}: {to_cpu:.1} dB, {to_other:.1} dB", view.size);

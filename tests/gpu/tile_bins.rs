@@ -6,7 +6,7 @@
 //! there is no GPU.
 
 use crate::support::blob::blob;
-use crate::support::lent_gpu;
+use crate::support::gpu;
 use crate::support::surfaces::{depth_texture, edge};
 use bevy_gs4d::codec::ReadOptions;
 use bevy_gs4d::codec::load;
@@ -61,7 +61,7 @@ fn assert_same(found: &Frame, expected: &Frame, what: &str) {
 
 #[test]
 fn lists_longer_than_workgroup_memory_are_drawn_in_order() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     for (count, layer) in [(3000, 1), (5000, 50), (6000, 6000)] {
         let (scene, view) = (crowd(count, layer, 0.05), view(64));
         let expected = first_frame(&mut headless, Design::GlobalSort, &scene, &view);
@@ -73,7 +73,7 @@ fn lists_longer_than_workgroup_memory_are_drawn_in_order() {
 
 #[test]
 fn overflowing_bins_are_drawn_completely_in_the_first_frame() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     // The initial capacity of bins of 2 x 2 tiles is 4096 splats; some bins contain all 6000 splats.
     let (scene, view) = (crowd(6000, 1, 0.05), view(400));
     let expected = first_frame(&mut headless, Design::GlobalSort, &scene, &view);
@@ -88,7 +88,7 @@ fn overflowing_bins_are_drawn_completely_in_the_first_frame() {
 
 #[test]
 fn overflowing_bins_grow_in_the_next_frame() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let (scene, view) = (crowd(6000, 1, 0.05), view(400));
     let capture = headless.upload(&scene).expect("the scene fits");
     headless.set_design(Design::TileBins);
@@ -121,7 +121,7 @@ fn crowd_among_many(shown: usize, all: usize) -> RuntimeScene {
 #[test]
 #[ignore = "takes minutes; `.ci/full` runs it by name"]
 fn bins_with_exact_room_match_the_reference_design() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     // The first guess of equal rooms is too large for all pictures. In the first, later frames have equal rooms; in the
     // others the fullest bin is too full for that. A workgroup counts the splats of 529 and of 1920 bins in workgroup
     // memory, but not those of 2176.
@@ -157,7 +157,7 @@ fn bins_with_exact_room_match_the_reference_design() {
 #[test]
 #[ignore = "takes minutes; `.ci/full` runs it by name"]
 fn a_crowd_in_one_bin_does_not_enlarge_the_others() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let scene = crowd(6_000, 7, 0.001);
     let capture = headless.upload(&scene).expect("the scene fits");
     headless.set_design(Design::TileBins);
@@ -180,7 +180,7 @@ fn difference(found: &Frame, expected: &Frame) -> f32 {
 
 #[test]
 fn every_variant_of_blending_matches_the_reference_design() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let scene = synthesize(&SynthSettings { count: 4_000, ..SynthSettings::default() });
     let scene = scene.into_runtime().expect("a scene that can be drawn");
     let size = UVec2::new(131, 97);
@@ -230,7 +230,7 @@ fn every_variant_of_blending_matches_the_reference_design() {
 /// pictures.
 #[test]
 fn the_bundled_capture_without_depths_matches_the_reference_design() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/toybox.gs4d");
     let scene = load(&path, &ReadOptions::default()).expect("the bundled capture").into_runtime();
     let scene = scene.expect("a scene that can be drawn");
@@ -254,7 +254,7 @@ fn the_bundled_capture_without_depths_matches_the_reference_design() {
 
 #[test]
 fn half_precision_colors_are_rounded_single_precision_colors() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let (scene, view) = (crowd(2000, 7, 0.05), view(130));
     let capture = headless.upload(&scene).expect("the scene fits");
     let instances = [Instance { capture: &capture, active: None, view, appearance: Appearance::default() }];
@@ -276,7 +276,7 @@ fn half_precision_colors_are_rounded_single_precision_colors() {
 
 #[test]
 fn pictures_of_many_tiles_have_larger_bins() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     // 8281 tiles are too many for bins of 2 x 2 tiles.
     let (scene, view) = (crowd(500, 1, 0.1), view(1456));
     let expected = first_frame(&mut headless, Design::GlobalSort, &scene, &view);
@@ -288,7 +288,7 @@ fn pictures_of_many_tiles_have_larger_bins() {
 #[test]
 #[ignore = "takes minutes; `.ci/full` runs it by name"]
 fn large_parts_with_several_gaussians_per_thread_match_the_reference_design() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     // From a million Gaussians on, `project_bin` uses the variant for few bins.
     for (count, shown) in [(300_000, 97), (1_100_000, 397)] {
         let (mut scene, view) = (crowd(count, 1000, 0.02), view(256));
@@ -312,7 +312,7 @@ fn large_parts_with_several_gaussians_per_thread_match_the_reference_design() {
 
 #[test]
 fn copies_drawn_by_one_dispatch_equal_copies_drawn_separately() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let synthetic = |seed| {
         let settings = SynthSettings { count: 40, seed, ..SynthSettings::default() };
         synthesize(&settings).into_runtime().expect("a scene that can be drawn")

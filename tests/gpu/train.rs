@@ -10,7 +10,7 @@ use crate::support::blob::blob;
 use crate::support::interrupting::Interrupting;
 use crate::support::trained::{trained, trained_mut};
 use crate::support::training::{SEED, add_terms, growing, growing_step, still_growth, view};
-use crate::support::{dataset, lent_gpu};
+use crate::support::{dataset, gpu};
 use bevy_gs4d::gaussian::{Gaussian, GradientMode, Harmonics, Parameters};
 use bevy_gs4d::internal::offline::dataset::Clock;
 use bevy_gs4d::internal::offline::dataset::camera_numbers;
@@ -60,7 +60,7 @@ fn records(parameters: &Parameters) -> Vec<TrainedRecord> {
 
 #[test]
 fn the_pass_noise_matches_the_cpu_reference() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let mut scene = synthetic();
     let parameters = &mut trained_mut(&mut scene).parameters;
     // From transparent to opaque.
@@ -103,7 +103,7 @@ fn the_pass_noise_matches_the_cpu_reference() {
 
 #[test]
 fn dropped_gaussians_are_hidden_until_the_next_step() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let (scene, view, black) = (synthetic(), view(0, UVec2::new(70, 54)), Background::Color([0.0; 3]));
     let (share, seed, step) = (0.3, dropout_seed(SEED, 0), growing_step(0, Rates::OURS, 144));
     let growth = Growth { dropout: share, ..still_growth() };
@@ -147,7 +147,7 @@ fn assert_copied(before: &TrainerState, after: &TrainerState, source: &[usize], 
 
 #[test]
 fn relocation_matches_the_cpu_reference_and_hardly_changes_the_picture() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let mut scene = synthetic();
     let parameters = &mut trained_mut(&mut scene).parameters;
     // A third has faded: it is nearly invisible.
@@ -217,7 +217,7 @@ fn screen_gradients(scene: &RuntimeScene, view: &View, pixels: &[Vec3]) -> Vec<(
 
 #[test]
 fn the_densification_of_the_original_is_that_of_the_cpu_reference() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let mut scene = synthetic();
     scene.trained_with.spatial_lr_scale = 3.0;
     let parameters = &mut trained_mut(&mut scene).parameters;
@@ -304,7 +304,7 @@ fn the_densification_of_the_original_is_that_of_the_cpu_reference() {
 
 #[test]
 fn the_gradient_of_the_term_of_scale_matches_the_cpu_reference() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let scene = synthetic();
     let terms = Terms { scale: 0.7, ..Terms::default() };
     let parameters = &trained(&scene).parameters;
@@ -327,7 +327,7 @@ fn the_gradient_of_the_term_of_scale_matches_the_cpu_reference() {
 
 #[test]
 fn color_values_beyond_the_degree_are_not_trained() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let scene = synthetic();
     let size = UVec2::new(70, 54);
     let view = view(0, size);
@@ -439,7 +439,7 @@ fn settings(steps: usize) -> FineTuneSettings {
 
 #[test]
 fn a_capture_is_trained_from_nothing() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new();
     let out = lesson.folder.path().join("out.gs4d");
     for (start, least) in [(Start::Hull, 37.0), (Start::Random, 22.0)] {
@@ -458,7 +458,7 @@ fn a_capture_is_trained_from_nothing() {
 
 #[test]
 fn exposures_even_out_the_gains_of_cameras() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new();
     // Three cameras of nine see half the light; the camera held out has the mean gain, which is far from the gain of
     // most cameras.
@@ -501,7 +501,7 @@ fn original(steps: usize, capacity: usize) -> FineTuneSettings {
 
 #[test]
 fn a_capture_grows_from_few_gaussians_as_in_the_original() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new();
     let start = StartSettings { gaussians: 60, degree: 1, ..StartSettings::default() };
     let out = lesson.folder.path().join("out.gs4d");
@@ -519,7 +519,7 @@ fn a_capture_grows_from_few_gaussians_as_in_the_original() {
 
 #[test]
 fn training_as_the_original_repeats_and_resumes_at_the_same_bytes() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new();
     let start = StartSettings { gaussians: 60, ..StartSettings::default() };
     let settings = FineTuneSettings { evaluate_every: 45, ..original(180, 120) };
@@ -541,7 +541,7 @@ fn training_as_the_original_repeats_and_resumes_at_the_same_bytes() {
 
 #[test]
 fn training_from_nothing_repeats_and_resumes_at_the_same_bytes() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new();
     let start = StartSettings { gaussians: 200, ..StartSettings::default() };
     let growth =

@@ -6,7 +6,7 @@
 
 use crate::support::trained::trained_mut;
 use crate::support::training::{add_terms, growing, growing_step, round, still_growth, view};
-use crate::support::{lent_gpu, limited_device};
+use crate::support::{gpu, limited_device};
 use bevy_gs4d::internal::offline::compress::Centers;
 use bevy_gs4d::internal::offline::engine::TrainedRecord;
 use bevy_gs4d::internal::offline::train::{Cloning, FREE, Request, Sample, Trainer, TrainerState, is_free};
@@ -85,7 +85,7 @@ fn assert_same(
     prepare: impl Fn(&mut Trainer<'_>),
     change: impl Fn(&mut Trainer<'_>, usize),
 ) -> Option<Vec<TrainerState>> {
-    let (mut headless, mut limited) = (lent_gpu::headless()?, limited_device::binding(BINDING)?);
+    let (mut headless, mut limited) = (gpu::headless()?, limited_device::binding(BINDING)?);
     let trained = |headless: &mut Headless| {
         let mut trainer = growing(headless, scene(logit), growth);
         prepare(&mut trainer);

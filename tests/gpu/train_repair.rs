@@ -9,7 +9,7 @@ use crate::support::blob::blob;
 use crate::support::interrupting::Interrupting;
 use crate::support::trained::{trained, trained_mut};
 use crate::support::training::still_growth;
-use crate::support::{dataset, lent_gpu};
+use crate::support::{dataset, gpu};
 use bevy_gs4d::gaussian::{Gaussian, Harmonics};
 use bevy_gs4d::internal::offline::store::{Key, Store};
 use bevy_gs4d::internal::offline::train::{Births, Floaters};
@@ -126,7 +126,7 @@ fn with_births() -> Growth {
 
 #[test]
 fn a_ball_that_the_scene_lacks_is_found_with_births() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new();
     let mut error = |growth: Option<Growth>| {
         let scene = match growth {
@@ -148,7 +148,7 @@ fn a_ball_that_the_scene_lacks_is_found_with_births() {
 #[test]
 #[ignore = "takes minutes; `.ci/full` runs it by name"]
 fn training_with_births_repeats_and_resumes_at_the_same_bytes() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new();
     let mut run = |store: Option<&Store>, progress: &mut dyn Progress| {
         lesson.train(&mut headless, nothing(), with_births(), store, progress)
@@ -166,7 +166,7 @@ fn training_with_births_repeats_and_resumes_at_the_same_bytes() {
 
 #[test]
 fn a_gaussian_before_a_camera_is_hidden() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new();
     let mut scene = nothing();
     let eye = lesson.views[0].camera.view(0.0, RasterFov::Corrected).camera_position;

@@ -6,7 +6,7 @@
 
 use crate::support::trained::{trained, trained_mut};
 use crate::support::training::{SEED, growing_step, still_growth};
-use crate::support::{gpu, lent_gpu, limited_device};
+use crate::support::{gpu, limited_device};
 use bevy_gs4d::gaussian::{GradientMode, Parameters, SliceSettings};
 use bevy_gs4d::internal::offline::engine::TrainedRecord;
 use bevy_gs4d::internal::offline::train::{Request, Standing, Trainer, stand};
@@ -112,7 +112,7 @@ fn the_pass_standing_matches_the_cpu_reference_in_every_part() {
 
 #[test]
 fn noise_moves_what_stands_in_space_alone() {
-    let Some(mut headless) = lent_gpu::headless() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     let growth = Growth { noise: 5e5, ..still_growth() };
     // The second step begins with what stands.
     let still = stepped(&mut headless, scene(), None);

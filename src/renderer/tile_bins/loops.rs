@@ -10,6 +10,9 @@ const STEPS: u64 = 8;
 /// An upper bound of the iterations of a step apart from the scan.
 const OF_STEP: u64 = 60;
 
+/// An upper bound of the iterations of the four sums over threads in a round of `sort_bins`: of the values of a group of threads, then of groups.
+const SUMS: u64 = 4 * (32 + 16);
+
 /// Returns the number of iterations of a thread of `blend_blocks`, with the smallest batches.
 fn of_blend_blocks(slots: u32, fullest: u32, searches: bool) -> u64 {
     const BATCH: u64 = 128;
@@ -26,13 +29,13 @@ fn of_sort_bins(fullest: u32, lists: Lists) -> u64 {
     let (fullest, [list, threads]) = (u64::from(fullest), lists.sizes().map(u64::from));
     let sort = |count: u64| (count / threads + 1) * (count + count / 2);
     if fullest <= list {
-        return sort(fullest);
+        return sort(fullest) + SUMS;
     }
     let round = list / 2;
     // A loop over entries has an inner loop over four of them.
     let scan = 5 * fullest / (4 * threads) + OF_STEP;
     // Bins that are counted first are ordered by four scans.
-    4 * scan + (fullest / round + 1) * ((1 + STEPS) * scan + sort(round) + 100)
+    4 * scan + (fullest / round + 1) * ((1 + STEPS) * scan + sort(round) + 100 + SUMS)
 }
 
 /// Returns whether tile bins draw every frame of so many slots completely, on a device with these limits.
