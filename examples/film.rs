@@ -5,12 +5,11 @@
 //! cargo run --release --features viewer --example film -- [FOLDER] [--rig RIG] [--cameras N] [--times N] \
 //!     [--shutter SHUTTER] [--size SIZE] [--test-at FRACTION] [--take SECONDS --from SECONDS --until SECONDS]
 //! examples/film/island.sh [FOLDER]
-//! examples/film/petals.sh [FOLDER]
 //! examples/film/take.sh [FOLDER]
 //! ```
 //!
-//! The first script films, trains, bakes and evaluates; the second keeps the petals, which have few pixels; the third
-//! makes a capture of a minute, in chunk files.
+//! The first script films, trains, bakes and evaluates, and keeps the petals, which have few pixels; the second makes a
+//! capture of a minute, in chunk files.
 //!
 //! `points.json` in the folder has the tracks of ten points of the scene, with which `gs4d socket --points` compares
 //! sockets.
