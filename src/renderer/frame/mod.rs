@@ -15,4 +15,4 @@ pub use design::Design;
 pub use parameters::{Instance, OpaqueDepth, ViewParameters};
 pub(super) use recording::*;
 pub(super) use sizes::{Sizes, grown, max_pairs};
-pub(super) use view_design::{Preparation, ViewDesign};
+pub(super) use view_design::{CountedFrame, Preparation, ViewDesign};

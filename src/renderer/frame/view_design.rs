@@ -46,6 +46,17 @@ impl<'a> Preparation<'a> {
     }
 }
 
+/// A frame whose counters are read back, which takes some frames: the view may have other bins by then.
+#[derive(Debug, Clone, Copy, Default)]
+pub(in crate::renderer) struct CountedFrame {
+    /// The largest number of splats at any time of its captures.
+    pub at_most: usize,
+    /// The number of its bins.
+    pub bins: u32,
+    /// The number of entries of all its bins together; 0 if they were counted before they were filled.
+    pub entries: u32,
+}
+
 /// A design at work for one view: its state from frame to frame, its buffers, if there are any, and its passes.
 pub(in crate::renderer) trait ViewDesign: Any + Debug + Send + Sync {
     /// Returns its name, which is not [`Design::Auto`].
@@ -106,10 +117,15 @@ pub(in crate::renderer) trait ViewDesign: Any + Debug + Send + Sync {
     /// Returns the number of pairs of a frame with these counters, written or not.
     fn pair_count(&self, counters: &Counters) -> u32;
 
-    /// Processes the counters of an earlier frame, and the largest number of splats at any time of its captures.
-    fn note(&mut self, _counters: &Counters, _at_most: usize) {}
+    /// Returns what the counters of the frame prepared last count, of captures with at most so many splats at any time.
+    fn counted(&self, at_most: usize) -> CountedFrame {
+        CountedFrame { at_most, ..CountedFrame::default() }
+    }
 
-    /// Returns the number of entries of bins with room for as many splats as the fullest bin of an earlier frame.
+    /// Processes the counters of an earlier frame.
+    fn note(&mut self, _counters: &Counters, _frame: CountedFrame) {}
+
+    /// Returns the number of entries that the bins of an earlier frame needed, with room for as many splats as in the fullest of them.
     fn entries_needed(&self) -> u32 {
         0
     }

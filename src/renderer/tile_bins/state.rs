@@ -6,7 +6,7 @@
 use super::bins::bin_grid;
 use super::stamps::stamp;
 use super::variant::BinVariant;
-use crate::renderer::frame::Sizes;
+use crate::renderer::frame::{CountedFrame, Sizes};
 use crate::renderer::layout::Counters;
 use glam::UVec2;
 
@@ -25,8 +25,9 @@ pub(in crate::renderer) struct BinState {
     pub recorded: bool,
     /// Number of the frame among those of all views.
     pub frame: u32,
-    /// Number of splats of the fullest bin of an earlier frame.
+    /// Number of splats of the fullest bin of an earlier frame, and the number of entries that its bins needed with room for as many.
     pub fullest: u32,
+    pub needed: u32,
     /// Number of visible splats of an earlier frame, if they have been counted.
     pub visible: Option<u32>,
     /// The largest number of splats at any time of the captures of the newest frame of which some were visible.
@@ -100,14 +101,20 @@ impl BinState {
         too_many || counters.pairs > sizes.pairs
     }
 
-    /// Processes the counters of a frame that was drawn with these sizes, of captures with at most so many splats.
-    pub(super) fn note(&mut self, sizes: &Sizes, counters: &Counters, at_most: usize) {
+    /// Returns what the counters of a frame with these sizes count, of captures with at most so many splats.
+    pub(super) fn counted(&self, sizes: &Sizes, at_most: usize) -> CountedFrame {
+        let entries = if self.variant.counted { 0 } else { sizes.entries };
+        CountedFrame { at_most, bins: self.count(), entries }
+    }
+
+    /// Processes the counters of an earlier frame.
+    pub(super) fn note(&mut self, counters: &Counters, frame: CountedFrame) {
         if counters.visible > 0 {
-            self.counted_of = at_most;
+            self.counted_of = frame.at_most;
         }
         (self.fullest, self.visible) = (counters.pairs_wanted, Some(counters.visible));
-        let capacity = if self.variant.counted { 0 } else { sizes.entries };
-        self.room.note(self.fullest.saturating_mul(self.count()), capacity);
+        self.needed = self.fullest.saturating_mul(frame.bins);
+        self.room.note(self.needed, frame.entries);
     }
 }
 
@@ -160,7 +167,7 @@ mod tests {
         assert!(!bins.must_count(guess, 5000), "the guess fits");
         let counters = Counters { visible: 300, pairs: 700, pairs_wanted: 100, padding: 0 };
         let sizes = Sizes { pairs: 700, entries: 5000, ordered: 700, ..Sizes::default() };
-        bins.note(&sizes, &counters, 900);
+        bins.note(&counters, bins.counted(&sizes, 900));
         let needed = bins.count() * 100;
         assert!(bins.must_count(guess, needed), "the fullest bin is known, and needs a reserve of one half");
         assert!(!bins.must_count(guess, needed + needed / 2), "equal rooms with their reserve fit");
@@ -175,13 +182,25 @@ mod tests {
     }
 
     #[test]
+    fn counters_count_the_bins_of_their_own_frame() {
+        let mut bins = BinState { picture: UVec2::new(400, 400), side: 2, ..BinState::default() };
+        let sizes = Sizes { entries: 1 << 20, ..Sizes::default() };
+        let frame = bins.counted(&sizes, 900);
+        (bins.picture, bins.side, bins.variant.counted) = (UVec2::new(3840, 2160), 4, true);
+        bins.note(&Counters { visible: 300, pairs: 9000, pairs_wanted: 5000, padding: 0 }, frame);
+        assert_eq!(bins.needed, 13 * 13 * 5000, "the picture of 400 x 400 pixels has 13 x 13 bins of 2 x 2 tiles");
+        assert_eq!(bins.counted(&sizes, 900).entries, 0, "the newest frame has its bins counted first");
+    }
+
+    #[test]
     fn counts_of_few_splats_say_nothing_of_many() {
         let mut bins = BinState { picture: UVec2::new(640, 480), side: 4, ..BinState::default() };
         assert!(!bins.is_known(1), "no frame has been counted");
         let none = Counters { visible: 0, pairs: 0, pairs_wanted: 0, padding: 0 };
-        bins.note(&Sizes::default(), &none, 4_000_000);
+        let of = |at_most| CountedFrame { at_most, bins: 1, entries: 0 };
+        bins.note(&none, of(4_000_000));
         assert!(!bins.is_known(4_000_000), "nothing was visible");
-        bins.note(&Sizes::default(), &Counters { visible: 500, ..none }, 1000);
+        bins.note(&Counters { visible: 500, ..none }, of(1000));
         assert_eq!([1000, 2000, 2001].map(|splats| bins.is_known(splats)), [true, true, false]);
         assert!(bins.another(0).is_known(2000), "a view that begins as this one");
     }

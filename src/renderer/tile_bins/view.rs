@@ -10,10 +10,7 @@ use super::scratch::ScratchBuffers;
 use super::state::BinState;
 use super::variant::{BinVariant, Lists};
 use crate::renderer::device::GpuError;
-use crate::renderer::frame::Blending;
-use crate::renderer::frame::Design;
-use crate::renderer::frame::Recording;
-use crate::renderer::frame::{Preparation, Sizes, ViewDesign};
+use crate::renderer::frame::{Blending, CountedFrame, Design, Preparation, Recording, Sizes, ViewDesign};
 use crate::renderer::layout::{BIN_COUNTERS, Counters};
 use crate::renderer::pipelines::Renderer;
 use crate::renderer::shaders::Storage;
@@ -158,14 +155,17 @@ impl ViewDesign for TileBins {
         counters.pairs
     }
 
-    fn note(&mut self, counters: &Counters, at_most: usize) {
-        if let Some(buffers) = &self.buffers {
-            self.state.note(&buffers.sizes, counters, at_most);
-        }
+    fn counted(&self, at_most: usize) -> CountedFrame {
+        let counted = |buffers: &BinBuffers| self.state.counted(&buffers.sizes, at_most);
+        self.buffers.as_ref().map(counted).unwrap_or_default()
+    }
+
+    fn note(&mut self, counters: &Counters, frame: CountedFrame) {
+        self.state.note(counters, frame);
     }
 
     fn entries_needed(&self) -> u32 {
-        self.state.fullest.saturating_mul(self.state.count())
+        self.state.needed
     }
 
     fn is_complete(&self, slots: u32, counters: &Counters) -> bool {

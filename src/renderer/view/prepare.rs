@@ -197,7 +197,7 @@ impl ViewRenderer {
             let counters: Counters = bytemuck::pod_read_unaligned(&counters);
             self.statistics.visible = counters.visible;
             self.statistics.pairs = self.design.pair_count(&counters);
-            self.make_room_for(&counters, self.copied_at_most);
+            self.make_room_for(&counters, self.copied);
         }
         if let Some((timer, readback)) = &mut self.timing
             && let Some(timestamps) = readback.poll()

@@ -3,8 +3,7 @@
 //! In: a prepared view and the instances for which it was prepared. Out: one compute pass, in the order of the table in [`crate::renderer`].
 
 use super::view_renderer::ViewRenderer;
-use crate::renderer::frame::Instance;
-use crate::renderer::frame::Recording;
+use crate::renderer::frame::{Instance, Recording};
 use crate::renderer::pipelines::Renderer;
 use crate::renderer::timing::PassTimer;
 
@@ -46,7 +45,7 @@ impl ViewRenderer {
         drop(pass);
         if let Some((counters, offset)) = self.design.counters().filter(|_| self.readback.is_idle()) {
             self.readback.copy(encoder, counters, offset);
-            (self.copied_from, self.copied_at_most) = (self.generation, self.at_most);
+            (self.copied, self.copied_from) = (self.design.counted(self.at_most), self.generation);
         }
     }
 }

@@ -6,8 +6,7 @@ use super::motion::MotionResources;
 use super::readback::Readback;
 use super::resources::Resources;
 use crate::renderer::device::memory::Allocator;
-use crate::renderer::frame::Design;
-use crate::renderer::frame::ViewDesign;
+use crate::renderer::frame::{CountedFrame, Design, ViewDesign};
 use crate::renderer::global_sort::{FinishedFrame, GlobalSort};
 use crate::renderer::layout::{self, Counters};
 use crate::renderer::pipelines::Renderer;
@@ -41,12 +40,13 @@ pub struct ViewRenderer {
     /// Whether the client checks each frame with [`must_draw_again`](Self::must_draw_again), and whether a frame had to be drawn again.
     pub(in crate::renderer) draws_again: bool,
     pub(super) crowded: bool,
-    /// Number of releases of the buffers, and the value that it had when the counters that are read back were copied.
+    /// Number of releases of the buffers.
     pub(super) generation: u32,
-    pub(super) copied_from: u32,
-    /// The largest number of splats at any time, of the frame prepared last and of that whose counters are read back.
+    /// The largest number of splats at any time, of the frame prepared last.
     pub(super) at_most: usize,
-    pub(super) copied_at_most: usize,
+    /// The frame whose counters are read back, and the number of releases before it.
+    pub(super) copied: CountedFrame,
+    pub(super) copied_from: u32,
     /// Whether the frame prepared last has depths, and whether colors of splats are computed.
     pub(super) has_depths: bool,
     pub(super) has_colors: bool,
@@ -86,9 +86,9 @@ impl ViewRenderer {
             draws_again: false,
             crowded: false,
             generation: 0,
-            copied_from: 0,
             at_most: 0,
-            copied_at_most: 0,
+            copied: CountedFrame::default(),
+            copied_from: 0,
             pairs_wanted: 0,
             short_of_room: false,
             oversized_frames: 0,
@@ -200,9 +200,8 @@ impl ViewRenderer {
     }
 
     /// Makes the next [`prepare`](Self::prepare) increase the capacities of pairs and bins to 1.5 times these counters if they exceed three
-    /// quarters of the capacities, within the limits of the device. `at_most` is the largest number of splats at any time of the captures of
-    /// that frame.
-    pub(super) fn make_room_for(&mut self, counters: &Counters, at_most: usize) {
+    /// quarters of the capacities, within the limits of the device. `frame` is what they count.
+    pub(super) fn make_room_for(&mut self, counters: &Counters, frame: CountedFrame) {
         // Counts from before the release of the buffers are ignored.
         let Some(made) = &self.resources else { return };
         // The buffers grow before they are full, since counts arrive some frames late.
@@ -210,12 +209,12 @@ impl ViewRenderer {
         if pairs > made.sizes.pairs / 4 * 3 {
             self.pairs_wanted = pairs.saturating_add(pairs / 2);
         }
-        self.design.note(counters, at_most);
+        self.design.note(counters, frame);
     }
 
     /// Makes room as [`make_room_for`](Self::make_room_for), after the frame prepared last.
     pub(crate) fn make_room(&mut self, counters: &Counters) {
-        self.make_room_for(counters, self.at_most);
+        self.make_room_for(counters, self.design.counted(self.at_most));
     }
 
     /// Makes the first [`prepare`](Self::prepare) allocate the capacities of another view, or the larger capacities that the other view's next
