@@ -3,10 +3,11 @@
 //! In: a capture, with its temporal filter; a time, a box or a point with a radius. Out: the Gaussians that are drawn
 //! in the box at the time ([`Drawn`]); whether the point is on one of them; the colors around it.
 
+use super::error::SocketError;
 use super::look::Colored;
 use super::moment::{Drawn, is_inside};
 use crate::codec::import::columns::SH_C0;
-use crate::gaussian::{Gaussian, Harmonics, InvalidGaussian, lifespan_reach};
+use crate::gaussian::{Gaussian, Harmonics, lifespan_reach};
 use crate::scene::{Bounds, Form, GaussianScene, SceneForm, TrainedWith};
 use glam::{DVec3, Mat3, Vec3};
 use rayon::prelude::*;
@@ -38,8 +39,10 @@ impl Cloud {
     /// Returns the Gaussians of a scene.
     ///
     /// # Errors
-    /// The first Gaussian that cannot be drawn.
-    pub(super) fn of(scene: &GaussianScene) -> Result<Self, InvalidGaussian> {
+    /// Parts of the scene that do not fit together; the first Gaussian that cannot be drawn, of a scene in the trained
+    /// form. Of other forms such Gaussians are left out.
+    pub(super) fn of(scene: &GaussianScene) -> Result<Self, SocketError> {
+        scene.check().map_err(SocketError::Scene)?;
         let TrainedWith { time_interval, marginal_cutoff, .. } = scene.trained_with;
         let (gaussians, colors) = (scene.gaussians()?, colors(scene));
         let reach = lifespan_reach(marginal_cutoff) as f32;
@@ -70,11 +73,8 @@ impl Cloud {
     pub(super) fn drawn(&self, time: f64, bounds: Option<[DVec3; 2]>) -> Vec<Drawn> {
         let now = time as f32;
         let drawn = |piece: &Piece| {
-            let Piece { gaussian, color, drawn: [first, last] } = piece;
-            if !(*first..=*last).contains(&now) {
-                return None;
-            }
-            let (mean, opacity) = (gaussian.mean_at(now).as_dvec3(), gaussian.opacity * gaussian.marginal(now));
+            let Piece { gaussian, color, .. } = piece;
+            let (mean, opacity) = (gaussian.mean_at(now).as_dvec3(), piece.opacity_at(now)?);
             let is_in_box = bounds.is_none_or(|bounds| is_inside(mean, bounds));
             (opacity > FAINTEST && mean.is_finite() && is_in_box).then(|| {
                 let covariance = matrix(gaussian, 0.0).as_dmat3();
@@ -91,10 +91,10 @@ impl Cloud {
     pub(super) fn touches(&self, place: DVec3, time: f64, distance: f64) -> bool {
         let (at, now) = (place.as_vec3(), time as f32);
         let wider = (distance as f32 / SEEN).powi(2);
-        self.pieces.par_iter().any(|Piece { gaussian, drawn: [first, last], .. }| {
-            let is_drawn = (*first..=*last).contains(&now) && gaussian.opacity * gaussian.marginal(now) > FAINTEST;
-            let offset = gaussian.mean_at(now) - at;
-            is_drawn && offset.dot(matrix(gaussian, wider).inverse() * offset) <= SEEN * SEEN
+        self.pieces.par_iter().any(|piece| {
+            let is_drawn = piece.opacity_at(now).is_some_and(|opacity| opacity > FAINTEST);
+            let offset = piece.gaussian.mean_at(now) - at;
+            is_drawn && offset.dot(matrix(&piece.gaussian, wider).inverse() * offset) <= SEEN * SEEN
         })
     }
 
@@ -104,16 +104,20 @@ impl Cloud {
     pub(super) fn colors(&self, place: DVec3, time: f64, radius: f64) -> Vec<Colored> {
         let (at, now, limit) = (place.as_vec3(), time as f32, (9.0 * radius * radius) as f32);
         let colored = |piece: &Piece| {
-            let Piece { gaussian, color, drawn: [first, last] } = piece;
-            if !(*first..=*last).contains(&now) {
-                return None;
-            }
-            let distance = gaussian.mean_at(now).distance_squared(at);
+            let opacity = f64::from(piece.opacity_at(now)?);
+            let distance = piece.gaussian.mean_at(now).distance_squared(at);
             let near = (-0.5 * f64::from(distance) / (radius * radius)).exp();
-            let weight = f64::from(gaussian.opacity * gaussian.marginal(now)) * near;
-            (distance <= limit).then_some(Colored { color: *color, weight })
+            (distance <= limit).then_some(Colored { color: piece.color, weight: opacity * near })
         };
         self.pieces.par_iter().filter_map(colored).collect()
+    }
+}
+
+impl Piece {
+    /// Returns its opacity at a time (timestamp units), 0 to 1; `None` where it is not drawn.
+    fn opacity_at(&self, now: f32) -> Option<f32> {
+        let Self { gaussian, drawn: [first, last], .. } = self;
+        (*first..=*last).contains(&now).then(|| gaussian.opacity * gaussian.marginal(now))
     }
 }
 
@@ -128,10 +132,10 @@ fn colors(scene: &GaussianScene) -> Vec<Vec3> {
     let all = |harmonics: &Harmonics| -> Vec<Vec3> {
         (0..scene.len()).map(|index| Vec3::from_slice(harmonics.of(index)) * SH_C0 + 0.5).collect()
     };
-    match (&scene.form, scene.form.harmonics()) {
-        (SceneForm::Ready(Form::Packed(packed)), _) => all(&packed.clone().unpack().harmonics),
-        (_, Some(harmonics)) => all(harmonics),
-        _ => Vec::new(),
+    match &scene.form {
+        SceneForm::Trained(trained) => all(&trained.harmonics),
+        SceneForm::Ready(Form::Sliced(sliced)) => all(&sliced.harmonics),
+        SceneForm::Ready(Form::Packed(packed)) => all(&packed.clone().unpack().harmonics),
     }
 }
 

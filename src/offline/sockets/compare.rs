@@ -1,15 +1,15 @@
 //! How far from known tracks points are that are followed.
 //!
 //! In: a capture, [`KnownPoint`]s. Out: a [`Comparison`]: each point is followed in both directions from the middle of
-//! the times at which it is known; its distances from the known places, where it is lost, and how far the ways back miss
-//! the start.
+//! the times at which it is known; its distances from the known places, the part of these at which it is lost, and how far
+//! the ways back miss the start.
 //!
 //! A point is compared while it is there: without the places beyond a gap in its track, of the stretch nearest to the
 //! middle of the time interval.
 
 use super::cloud::Cloud;
 use super::error::SocketError;
-use super::follow::{Followed, Placement, follow_within};
+use super::follow::{Followed, Placement, check_samples, follow_within};
 use super::known_point::KnownPoint;
 use crate::offline::work::Progress;
 use crate::scene::GaussianScene;
@@ -75,6 +75,7 @@ pub fn compare(
     samples: usize,
     progress: &mut dyn Progress,
 ) -> Result<Comparison, SocketError> {
+    check_samples(samples)?;
     let cloud = Cloud::of(scene)?;
     progress.begin("comparing", points.len());
     let mut compared = Vec::with_capacity(points.len());
@@ -98,7 +99,7 @@ fn of_point(
         return Err(SocketError::Unknown { name, first, last });
     };
     let share = (f64::from(interval[1]) - f64::from(interval[0])) / cloud.span();
-    let samples = (samples.saturating_sub(1) as f64 * share).ceil() as usize + 1;
+    let samples = ((samples - 1) as f64 * share).ceil() as usize + 1;
     let placement = Placement { name: name.clone(), position, time, samples: samples.max(2) };
     let found = match follow_within(cloud, interval, &placement, progress) {
         Err(SocketError::NothingThere { .. }) => None,
@@ -126,7 +127,7 @@ impl Stretch {
     /// Returns the places of a point without a gap nearest to the middle of an interval of time; `None` if it has none in
     /// the interval.
     fn of(point: &KnownPoint, [first, last]: [f32; 2]) -> Option<Self> {
-        let middle = first + 0.5 * (last - first);
+        let middle = first.midpoint(last);
         let far = |time: f32| (time - middle).abs();
         let within: Vec<(f32, Option<[f32; 3]>)> =
             point.track.iter().copied().filter(|(time, _)| (first..=last).contains(time)).collect();

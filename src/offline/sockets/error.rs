@@ -46,6 +46,9 @@ pub enum SocketError {
         /// The last time of the capture, timestamp units.
         last: f32,
     },
+    /// A capture whose parts do not fit together.
+    #[error("{0}")]
+    Scene(&'static str),
     /// A Gaussian cannot be drawn.
     #[error("{0}")]
     Gaussian(#[from] InvalidGaussian),

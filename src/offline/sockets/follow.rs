@@ -18,9 +18,9 @@ use glam::{DQuat, DVec3, Quat, Vec3};
 
 /// Number of Gaussians around a point that tell whether it is in the air.
 const AROUND: usize = 48;
-/// Largest distance of them from the point, as a part of the size of the capture.
+/// Largest distance of Gaussians from a point that is on them, as a part of the size of the capture.
 const FARTHEST: f64 = 0.1;
-/// Fewest of them that are solid.
+/// Fewest Gaussians within that distance that are solid.
 const FEWEST: usize = 4;
 /// Largest distance from a point to what it is placed on, as a part of the size of the capture, unless that is around
 /// it.
@@ -80,6 +80,17 @@ pub fn follow(
     follow_within(&Cloud::of(scene)?, scene.trained_with.time_interval, placement, progress)
 }
 
+/// Checks the number of samples of a track.
+///
+/// # Errors
+/// It is not from 2 to 65,535.
+pub(super) fn check_samples(samples: usize) -> Result<(), SocketError> {
+    match (2..Socket::MOST_SAMPLES).contains(&samples) {
+        true => Ok(()),
+        false => Err(SocketError::Invalid("a number of samples of a socket that is not from 2 to 65535")),
+    }
+}
+
 /// As [`follow`], from the first to the last time of an interval, timestamp units, over which the samples are spread.
 ///
 /// # Errors
@@ -94,9 +105,7 @@ pub(super) fn follow_within(
     let start = SocketSample { time, position, rotation: Quat::IDENTITY.to_array(), error: 0.0 };
     let mut socket = Socket { name, samples: vec![start] };
     socket.check().map_err(SocketError::Invalid)?;
-    if !(2..Socket::MOST_SAMPLES).contains(&samples) {
-        return Err(SocketError::Invalid("a number of samples of a socket that is not from 2 to 65535"));
-    }
+    check_samples(samples)?;
     if !(first..=last).contains(&time) {
         return Err(SocketError::Outside { time, first, last });
     }
@@ -119,11 +128,11 @@ pub(super) fn follow_within(
         }
         tracks[side] = track;
         let end = end.unwrap_or(begin);
-        let there = part.again(cloud, end.place, end.time).filter(|_| end.time != begin.time);
+        let there = if end.time == begin.time { None } else { part.again(cloud, end.place, end.time) };
         let back = follower.walk(there, end, begin.time, progress)?;
         let arrived = back.last().filter(|step| end.time != begin.time && step.time == begin.time);
         returns[side] = arrived.map(|step| step.place.distance(begin.place) as f32);
-        skip(follower.steps(end.time, ends[side]), progress);
+        skip(follower.steps(begin.time, ends[side]) - follower.steps(begin.time, end.time), progress);
     }
     progress.finish();
     let [before, after] = tracks;

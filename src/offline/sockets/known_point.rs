@@ -71,7 +71,7 @@ fn known(name: String, times: &[f32], places: &[Option<[f64; 3]>], origin: &Orig
     let shown = printable(&name);
     if !Socket::is_name(&name) {
         return Err(format!(
-            "has a point with the name '{shown}': names have 1 to 256 bytes and no control characters; rename it"
+            "has a point with the name '{shown}': names are not blank, have at most 256 bytes and no control characters; rename it"
         ));
     }
     if places.len() != times.len() {

@@ -7,7 +7,7 @@
 //! | file | subject |
 //! |---|---|
 //! | `cloud` | the Gaussians of a capture that can be followed |
-//! | `moment` | what is drawn at a time, by place |
+//! | `moment` | what is there at a time, by place |
 //! | `surface` | the surfaces of what is drawn, as they are seen from all around |
 //! | `means` | the means of Gaussians, of those that move as what is around them |
 //! | `graph` | a deformation graph of what is around a point, which moves as rigidly as it can |

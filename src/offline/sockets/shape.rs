@@ -27,8 +27,8 @@ const STIFFNESS: f64 = 0.7;
 const INERTIA: f64 = 0.5;
 /// How strongly nodes stay where they are expected: it decides for nodes that nothing else pulls.
 const HOLD: f64 = 0.01;
-/// Lengths of the step that tells how nodes move at the start, as parts of the time interval of the capture: that of the
-/// first counts over which the shape moves as expected.
+/// Lengths of the trial step that finds the velocities of nodes at the start, as parts of the time interval of the
+/// capture, the longest first: the first one over which no node moves too far is used.
 const TRIALS: [f64; 3] = [1.0 / 64.0, 1.0 / 256.0, 1.0 / 1024.0];
 /// Distance around the nodes within which features are found, and from the point, in spacings.
 const MARGIN: f64 = 5.0;

@@ -16,8 +16,8 @@ use glam::DVec3;
 const REACH: f64 = 0.006;
 /// Distance up to which Gaussians are looked at, in reaches.
 const FARTHEST: f64 = 5.0;
-/// The time in which a Gaussian of another velocity goes away from the thing by a reach where its weight is lower by the
-/// root of e, as a part of the time interval of the capture.
+/// The time, as a part of the time interval of the capture, in which a Gaussian moves away from the thing by one reach if
+/// the difference of their velocities lowers its weight by the root of e.
 const ALIKE: f64 = 1.0 / 32.0;
 /// The root of the trace of the covariance up to which a Gaussian has its whole weight, in reaches, and the excess over
 /// that, as a part of it, at which the weight is lower by the root of e.
@@ -35,7 +35,7 @@ const FEWEST: f64 = 0.3;
 const LEAST: f64 = 0.2;
 /// Longest way of the center in one step from where it was expected, in reaches.
 const LONGEST_WAY: f64 = 0.5;
-/// Number of rounds in which a center settles.
+/// Number of rounds in which a center settles after the first, which finds its velocity.
 const ROUNDS: usize = 6;
 
 /// A small thing.

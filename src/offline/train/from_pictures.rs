@@ -177,7 +177,7 @@ impl<'a> Training<'a> {
             let PointCloud(points) = points;
             let data = settings.data.display();
             progress.note(&format!(
-                "note: {data}: most cameras see none of its {} points, which are not used (--start points uses them)",
+                "note: {data}: most cameras see less than a hundredth of its {} points, which are not used (--start points uses them)",
                 points.len()
             ));
         }

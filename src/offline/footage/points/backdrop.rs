@@ -9,7 +9,7 @@ use std::iter::successors;
 
 /// Distance behind what stands from which it hides a place, as a share of its depth.
 const BEHIND: f32 = 0.04;
-/// Most cells of a level along each side of a rectangle that are looked at.
+/// Cells of a level that a rectangle is long at most; one more is looked at along each side.
 const ACROSS: u32 = 4;
 
 /// The depths of what stands, as a camera sees it.

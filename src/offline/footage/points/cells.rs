@@ -8,7 +8,8 @@ use rayon::prelude::*;
 
 /// Most bits of a coordinate.
 const MOST_LEVELS: u32 = 20;
-/// The neighbors of a cube that come first in one of the three directions, and by that in half of all pairs.
+/// One of each two opposite neighbors of a cube, the one that comes later by x, then y, then z: each pair of touching
+/// cubes is found once.
 const HALF_OF_NEIGHBORS: [[i32; 3]; 13] = [
     [1, -1, -1],
     [1, -1, 0],

@@ -1,8 +1,8 @@
 //! The points of a take.
 //!
 //! In: cameras, the times of the moments, the masked pictures of each moment as they are needed, the points of what
-//! stands, and what stands before the cameras. Out: [`TakePoints`]: points with colors, times and velocities. Pictures of one moment are in memory at a
-//! time.
+//! stands, and what stands before the cameras. Out: [`TakePoints`]: points with colors, times and velocities. Pictures of
+//! one moment are in memory at a time.
 
 use super::backdrop::Backdrop;
 use super::moving_hull::{Hull, Silhouette, Space};
@@ -15,7 +15,8 @@ use glam::Vec3;
 use image::{GrayImage, RgbImage};
 use rayon::prelude::*;
 
-/// Most points of a moment that velocities are found with, and most of all moments together.
+/// Most points of a moment that velocities are found with, and most of all moments together, unless more points are
+/// wanted.
 const DENSE: usize = 16_384;
 const MOST_DENSE: usize = 4_000_000;
 
@@ -47,9 +48,9 @@ impl TakePoints {
 }
 
 /// Returns at most so many points of all moments together, on the surfaces of what moves. `times` are those of the
-/// moments, ascending; `load` returns the pictures of a moment; `agreeing` is the least share of the cameras showing a
-/// place that have it inside their masks. Cameras that have a place behind one of the `backdrops` do not show it. Cameras that look at no common place have no points. Begins the task "points of
-/// the moments".
+/// moments, ascending; `load` returns the pictures of a moment; `agreeing` is the least share, of the cameras that show a
+/// place, that must have it inside their masks. A camera shows no place behind its backdrop. Cameras that look at no
+/// common place yield no points. Begins the task "points of the moments".
 ///
 /// # Errors
 /// Those of `load`; [`Interrupted`].

@@ -6,7 +6,10 @@ use crate::view::{Camera, RasterFov};
 use glam::{UVec2, Vec3};
 use image::{GrayImage, Luma};
 
-/// Returns cameras of 200 by 150 pixels around the origin. A pixel there is nearly 0.0157 wide.
+/// Width of a pixel at the origin, the mean over the cameras.
+pub(crate) const PIXEL: f32 = 0.0157;
+
+/// Returns cameras of 200 by 150 pixels around the origin.
 pub(crate) fn cameras(count: usize) -> Vec<Camera> {
     let eye = |index: usize| {
         let angle = index as f32 * 2.4;

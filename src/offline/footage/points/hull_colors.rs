@@ -20,8 +20,10 @@ const BEHIND: f32 = 3.0;
 /// has a picture of its size.
 pub(crate) fn colors(hull: &Hull, pictures: &[(Silhouette<'_>, RgbImage)], chosen: &[usize]) -> Vec<Option<Vec3>> {
     let places: Vec<Vec3> = hull.cells.par_iter().map(|&cell| hull.place(cell)).collect();
-    let maps: Vec<DepthMap> =
-        pictures.par_iter().map(|(silhouette, _)| DepthMap::of(&silhouette.projection, &places, hull.side)).collect();
+    let maps: Vec<NearestDepths> = pictures
+        .par_iter()
+        .map(|(silhouette, _)| NearestDepths::of(&silhouette.projection, &places, hull.side))
+        .collect();
     let color = |&index: &usize| {
         let place = places[index];
         let mut visible = Vec::new();
@@ -47,14 +49,14 @@ fn median(colors: &[[u8; 3]]) -> Option<Vec3> {
 }
 
 /// The depths of the nearest places in a reduced picture.
-struct DepthMap {
+struct NearestDepths {
     /// Side of a pixel of the map, pixels of the picture.
     side: u32,
     width: usize,
     depths: Vec<f32>,
 }
 
-impl DepthMap {
+impl NearestDepths {
     /// Returns the depths of these places, `cube` apart.
     fn of(projection: &Projection, places: &[Vec3], cube: f32) -> Self {
         let shown = places.iter().filter_map(|&place| projection.shown(place));

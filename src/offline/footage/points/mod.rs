@@ -12,7 +12,7 @@
 //! | `hull_colors` | the colors of a hull |
 //! | `surface_points` | the points of the surface of a hull, in clusters, and fewer of them |
 //! | `neighbors` | the nearest of many points |
-//! | `velocity` | the velocities of points between two moments |
+//! | `velocity` | the velocities of points, from the moments before and after |
 //! | `sweep` | depths of a picture that its neighbors agree with, as points |
 //! | `filling` | depths between those that are known |
 //! | `patch` | the correlation of two pictures where a plane shows in both |

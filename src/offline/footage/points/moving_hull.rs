@@ -1,8 +1,9 @@
 //! The visual hull of the motion masks of a moment.
 //!
 //! In: the masks of several cameras at one moment, what stands before each camera, and the cube that the cameras look
-//! at. Out: [`Hull`]: the cubes at the surface of what is inside the masks where nothing that stands hides it. Cubes are halved as long as they may be inside, so that cubes of one and a
-//! half pixels are found in a space of several cameras' width: a ball of eight pixels has about a hundred.
+//! at. Out: [`Hull`]: the cubes at the surface of what is inside the masks where nothing that stands hides it. Cubes are
+//! halved as long as they may be inside, so that cubes of one and a half pixels are found in a space twice as wide as the
+//! pictures show: a ball of eight pixels has about a hundred.
 
 use super::backdrop::Backdrop;
 use super::cells;
@@ -24,7 +25,8 @@ const COARSE: u32 = 5;
 const FINEST: u32 = 12;
 /// Cubes of one size above which they are not halved further: masks that cover nearly everything say little.
 const MOST_CELLS: usize = 1 << 21;
-/// Least number of cameras that show a place, if there are as many, and least share of all cameras.
+/// Least number of cameras that have a place inside their masks, if there are as many (never below two), and least share
+/// of all cameras.
 const FEWEST: usize = 3;
 const LEAST_SHARE: f32 = 0.25;
 /// Least share, of the cameras whose pictures show a place, that have it inside their masks, however many are hidden.
@@ -224,7 +226,7 @@ impl Hull {
 
 #[cfg(test)]
 mod tests {
-    use super::super::fixture::{cameras, mask};
+    use super::super::fixture::{PIXEL, cameras, mask};
     use super::*;
 
     fn hull(cameras: &[Camera], agreeing: f32, masks: impl Fn(usize, &Camera) -> GrayImage) -> Hull {
@@ -261,8 +263,7 @@ mod tests {
 
     #[test]
     fn a_ball_of_eight_pixels_is_found() {
-        // A pixel at the center is 4 * 0.73 / 200 wide.
-        let balls = [(Vec3::new(-0.6, 0.4, 0.3), 4.0 * 0.0146)];
+        let balls = [(Vec3::new(-0.6, 0.4, 0.3), 4.0 * PIXEL)];
         let found = hull(&cameras(12), 0.9, |_, camera| mask(camera, &balls));
         assert!((40..400).contains(&found.cells.len()), "about a hundred cubes: {}", found.cells.len());
         let mean = found.cells.iter().map(|&cell| found.place(cell)).sum::<Vec3>() / found.cells.len() as f32;

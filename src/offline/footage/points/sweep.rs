@@ -1,10 +1,10 @@
 //! Depths of a picture that its neighbors agree with, as points.
 //!
 //! In: pictures of one moment, or plates of what stands, with their cameras. Out: [`Standing`]: colored points, and what
-//! stands before each camera. For known pixels of
-//! every picture, the depth at which the pictures of the nearest cameras correlate best is kept if it is distinct, and
-//! if the depths of another picture agree. Pixels between them, such as those of a plain wall, get the mean of the
-//! depths around them: a Gaussian that begins near its wall finds it, and none hangs as fog before a camera.
+//! stands before each camera. For known pixels of every picture, the depth at which the pictures of the nearest cameras
+//! correlate best is kept if it is distinct, and if the depths of another picture agree. Pixels between them, such as
+//! those of a plain wall, get the mean of the depths around them: a Gaussian that begins near its wall finds it, and none
+//! hangs as fog before a camera.
 
 use super::backdrop::Backdrop;
 use super::filling::filled;
@@ -125,6 +125,11 @@ fn neighbors(views: &[GrayView], index: usize, center: Vec3) -> Vec<usize> {
     found.into_iter().take(NEIGHBORS).map(|(_, other)| other).collect()
 }
 
+/// Returns whether a pixel of a plate is known.
+fn is_known(confidence: &GrayImage, pixel: UVec2) -> bool {
+    confidence.get_pixel_checked(pixel.x, pixel.y).is_some_and(|share| share.0[0] >= KNOWN)
+}
+
 /// The depths of pixels of a picture, `step` apart; 0 where there is none.
 struct DepthMap {
     step: u32,
@@ -140,9 +145,7 @@ impl DepthMap {
         let size = view.projection.size / step;
         let of = |index: u32| {
             let at = middle(index, size.x, step);
-            let pixel = at.as_uvec2();
-            let is_known = confidence.get_pixel_checked(pixel.x, pixel.y).is_some_and(|share| share.0[0] >= KNOWN);
-            if is_known { depth(view, others, depths, at).unwrap_or(0.0) } else { 0.0 }
+            if is_known(confidence, at.as_uvec2()) { depth(view, others, depths, at).unwrap_or(0.0) } else { 0.0 }
         };
         Self { step, size, depths: (0..size.element_product()).into_par_iter().map(of).collect() }
     }
@@ -165,9 +168,7 @@ impl DepthMap {
         let point = |index: usize| {
             let at = middle(index as u32, self.size.x, self.step);
             let pixel = at.as_uvec2();
-            let is_known =
-                plate.confidence.get_pixel_checked(pixel.x, pixel.y).is_some_and(|share| share.0[0] >= KNOWN);
-            if depths[index] <= 0.0 || !is_known {
+            if depths[index] <= 0.0 || !is_known(&plate.confidence, pixel) {
                 return None;
             }
             let color = plate.picture.get_pixel(pixel.x, pixel.y).0.map(|value| f32::from(value) / 255.0);
