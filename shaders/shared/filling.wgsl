@@ -13,7 +13,8 @@
 // Every thread of the workgroup must call these functions; a thread without a splat has empty `tiles`.
 #define_import_path gs4d::filling
 
-#import gs4d::bins::entry_word
+#import gs4d::bins::{bin_grid, entry_word}
+#import gs4d::tile::{pack_tiles, unpack_tiles}
 
 // Counters (see BIN_COUNTERS), the number of visible splats of each part, the number of splats of each bin, the place
 // of each bin.
@@ -53,7 +54,7 @@ struct Filling {
 }
 
 fn filling_of(tiles: vec2<u32>, side: u32, first: u32, stride: u32, room: u32) -> Filling {
-    let grid = (tiles + side - 1u) / side;
+    let grid = bin_grid(tiles, side);
     return Filling(side, grid.x, grid.x * grid.y, first, stride, room);
 }
 
@@ -78,7 +79,7 @@ fn count_splat(filling: Filling, tiles: vec4<u32>, key: u32, slot: u32) -> vec4<
     if (b.z - b.x) * (b.w - b.y) > OWN_ENTRIES {
         let place = atomicAdd(&wide_listed, 1u);
         if place < WIDE {
-            wide[place] = vec4(tiles.xy | (tiles.zw << vec2(16u)), key, slot);
+            wide[place] = vec4(pack_tiles(tiles), key, slot);
             return vec4(0u);
         }
     }
@@ -92,11 +93,6 @@ fn count_splat(filling: Filling, tiles: vec4<u32>, key: u32, slot: u32) -> vec4<
     return b;
 }
 
-// Returns the tiles of one of the splats that all threads put into bins.
-fn wide_tiles(i: u32) -> vec4<u32> {
-    return vec4(wide[i].xy & vec2(0xffffu), wide[i].xy >> vec2(16u));
-}
-
 // Reserves entries for the splats that the workgroup has counted. Returns how many of them all threads put into bins
 // together.
 fn reserve_entries(filling: Filling, thread: u32) -> u32 {
@@ -104,7 +100,7 @@ fn reserve_entries(filling: Filling, thread: u32) -> u32 {
     let by_group = filling.count <= OWN_BINS;
     if wide_count > 0u {
         for (var i = 0u; by_group && i < wide_count; i++) {
-            let b = bins_of(filling, wide_tiles(i));
+            let b = bins_of(filling, unpack_tiles(wide[i].xy));
             for (var k = thread; k < (b.z - b.x) * (b.w - b.y); k += 256u) {
                 atomicAdd(&own[(b.y + k / (b.z - b.x)) * filling.across + b.x + k % (b.z - b.x)], 1u);
             }
@@ -150,7 +146,7 @@ fn put_splat(filling: Filling, b: vec4<u32>, tiles: vec4<u32>, key: u32, slot: u
 // Writes the splats that all threads put into bins together.
 fn put_wide_splats(filling: Filling, wide_count: u32, thread: u32) {
     for (var i = 0u; i < wide_count; i++) {
-        let tiles = wide_tiles(i);
+        let tiles = unpack_tiles(wide[i].xy);
         let b = bins_of(filling, tiles);
         for (var k = thread; k < (b.z - b.x) * (b.w - b.y); k += 256u) {
             put_in_bin(filling, b.x + k % (b.z - b.x), b.y + k / (b.z - b.x), tiles, wide[i].z, wide[i].w);

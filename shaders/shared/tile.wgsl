@@ -42,6 +42,11 @@ fn pack_tiles(tiles: vec4<u32>) -> vec2<u32> {
     return tiles.xz | (tiles.yw << vec2(16u));
 }
 
+// Returns the rectangle of the words `low` and `high`.
+fn unpack_tiles(words: vec2<u32>) -> vec4<u32> {
+    return vec4(words & vec2(0xffffu), words >> vec2(16u)).xzyw;
+}
+
 // Returns the number of columns of a rectangle.
 fn tile_columns(low: u32, high: u32) -> u32 {
     return (high & 0xffffu) - (low & 0xffffu);

@@ -60,7 +60,7 @@ struct InstanceUniforms {
     cropped: u32,
     // Gaussians per thread of `project_bin`.
     per_thread: u32,
-    // Tile bins. x: tiles along each side of a bin (8 bits) and frame number; y: capacity of each bin in splats, or 0
+    // Tile bins. x: tiles along each side of a bin (8 bits) and the stamp of the frame (16); y: capacity of each bin in splats, or 0
     // if bins are counted before they are filled; z: index of this part; w: number of parts.
     binning: vec4<u32>,
     // Screen-space variances of one training pixel squared, at one pixel per camera unit.

@@ -7,7 +7,7 @@
 // all splats are searched for the nearest splats of each batch instead. The picture is the same.
 #import gs4d::types::{SplatShape, VisibleSplat}
 #import gs4d::records::{read_shape, Splat}
-#import gs4d::bins::{depth_order, is_after, stamp, FIRST, NONE, STAMP_MASK}
+#import gs4d::bins::{depth_order, is_after, stamp_bits, FIRST, NONE, STAMP_MASK}
 #import gs4d::nearest::{begin_search, clear_intervals, count_candidate, next_search}
 #import gs4d::alpha::is_opaque
 #ifdef DEPTHS
@@ -17,7 +17,7 @@
 #else
 #import gs4d::pixel::{frame, surface_depth, write_color, FAR}
 #endif
-#import gs4d::tile::{energy_of, TILE_SIZE}
+#import gs4d::tile::{covers_tile, energy_of, tile_index, TILE_SIZE}
 
 const THREADS: u32 = 256u;
 // Splats per batch. Larger batches wait less often for the slowest block; smaller batches need less workgroup memory,
@@ -77,12 +77,10 @@ var<private> tile: vec2<u32>;
 // Returns the depth key and slot of a visible splat; NONE if it belongs to another frame or does not cover this tile.
 fn splat_of_tile(i: u32) -> vec2<u32> {
     let words = visible[i].words.zw;
-    if any((words & vec2(STAMP_MASK)) != stamp(frame.binning.x >> 8u)) {
+    if any((words & vec2(STAMP_MASK)) != stamp_bits(frame.binning.x >> 8u)) {
         return NONE;
     }
-    let first = words.x & ~STAMP_MASK;
-    let last = words.y & ~STAMP_MASK;
-    if tile.x < (first & 0xffffu) || tile.y < (first >> 16u) || tile.x >= (last & 0xffffu) || tile.y >= (last >> 16u) {
+    if !covers_tile(words.x & ~STAMP_MASK, words.y & ~STAMP_MASK, tile) {
         return NONE;
     }
     let slot = visible[i].words.x;
@@ -431,7 +429,7 @@ fn blend_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
         batch_b[BATCH] = vec4(0.0, -1e9, 0.0, 0.0);
         batch_c[BATCH] = vec4(0.0);
     }
-    let range = tile_ranges[group.y * frame.tiles.x + group.x];
+    let range = tile_ranges[tile_index(tile, frame.tiles.x)];
     workgroupBarrier();
     let searching = range.x == NONE.x;
     let end = range.y;

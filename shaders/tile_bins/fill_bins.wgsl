@@ -2,7 +2,7 @@
 // In: splats, the list of the visible splats, the index of the first entry of each bin. Out: unordered bins; the index
 // after the last entry of each bin. Entries beyond the end of the buffer are not written.
 #import gs4d::types::{FrameUniforms, SplatShape, VisibleSplat, BIN_COUNTERS}
-#import gs4d::bins::{depth_order, stamp, STAMP_MASK}
+#import gs4d::bins::{bin_grid, bin_side, depth_order, stamp_bits, STAMP_MASK}
 #import gs4d::filling::{begin_filling, bin_entries, count_splat, filling_of, put_splat, put_wide_splats, reserve_entries}
 
 @group(0) @binding(0) var<uniform> frame: FrameUniforms;
@@ -15,8 +15,8 @@ fn fill_bins(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) thread: u32,
 ) {
-    let side = frame.binning.x & 0xffu;
-    let grid = (frame.tiles + side - 1u) / side;
+    let side = bin_side(frame.binning);
+    let grid = bin_grid(frame.tiles, side);
     // The index of the next entry of a bin, in place of their number, is reserved.
     let places = BIN_COUNTERS + frame.binning.w + grid.x * grid.y;
     let filling = filling_of(frame.tiles, side, places, 0u, arrayLength(&bin_entries));
@@ -27,9 +27,8 @@ fn fill_bins(
         if first + thread < frame.slots {
             let words = visible[first + thread].words;
             // The list of a part may end before its last slot; the entries after it are those of earlier frames.
-            if all((words.zw & vec2(STAMP_MASK)) == stamp(frame.binning.x >> 8u)) {
-                let corners = words.zw & vec2(~STAMP_MASK);
-                tiles = vec4(corners.x & 0xffffu, corners.x >> 16u, corners.y & 0xffffu, corners.y >> 16u);
+            if all((words.zw & vec2(STAMP_MASK)) == stamp_bits(frame.binning.x >> 8u)) {
+                tiles = unpack_tiles(words.zw & vec2(~STAMP_MASK));
                 slot = words.x;
                 key = depth_order(splats[slot].place.w);
             }

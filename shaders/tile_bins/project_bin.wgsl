@@ -4,7 +4,7 @@
 // without color, the list of the visible splats, and unordered bins of a few tiles, or if they have no room yet, the
 // number of splats of each bin. CPU reference: src/reference/project.rs with src/gaussian/projection.rs.
 #import gs4d::types::{SplatShape, VisibleSplat, BIN_COUNTERS, DEBUG_ACTIVE, INVISIBLE}
-#import gs4d::bins::{depth_order, stamp}
+#import gs4d::bins::{bin_side, depth_order, stamp_bits}
 #import gs4d::capture::{index_of, instance, viewing_direction}
 #ifdef COPIED_INSTANCE
 #import gs4d::capture::instances
@@ -13,8 +13,6 @@
 #import gs4d::projection::{debug_color, is_present, projection_of}
 #ifdef OPAQUE
 #import gs4d::projection::mean_depth
-#endif
-#ifdef OPAQUE
 #import gs4d::tile::{pack_tiles, tile_index}
 #else
 #import gs4d::tile::pack_tiles
@@ -71,7 +69,7 @@ fn is_hidden(tiles: vec4<u32>, key: u32) -> bool {
 // counted.
 fn filled() -> Filling {
     let capacity = instance.binning.y;
-    return filling_of(instance.tiles, instance.binning.x & 0xffu, BIN_COUNTERS + instance.binning.w, capacity, capacity);
+    return filling_of(instance.tiles, bin_side(instance.binning), BIN_COUNTERS + instance.binning.w, capacity, capacity);
 }
 
 @compute @workgroup_size(256)
@@ -167,7 +165,7 @@ fn project_and_bin(first_of_group: u32, place: u32, count: u32, thread: u32) {
     }
     workgroupBarrier();
     if covered.z > covered.x {
-        let tiles = pack_tiles(covered) | stamp(instance.binning.x >> 8u);
+        let tiles = pack_tiles(covered) | stamp_bits(instance.binning.x >> 8u);
         visible[instance.first_slot + visible_before + place_of_visible] = VisibleSplat(seen, vec4(slot, index, tiles));
     }
     // Without room, the splats have been counted, unless the bins are too many for the counters of the workgroup.

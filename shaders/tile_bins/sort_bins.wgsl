@@ -9,8 +9,9 @@
 // bins are counted before they are filled (COUNTED), some lists are much longer than others: their entries are first
 // copied in order of parts, and read part by part.
 #import gs4d::types::{FrameUniforms, BIN_COUNTERS}
-#import gs4d::bins::{is_after, FIRST, NONE, SLOT_MASK}
+#import gs4d::bins::{bin_grid, bin_side, is_after, FIRST, NONE, SLOT_MASK}
 #import gs4d::nearest::{begin_search, clear_intervals, count_candidate, next_search}
+#import gs4d::tile::tile_index
 
 // Largest number of splats that are sorted at once.
 #ifdef LONG_LISTS
@@ -378,7 +379,7 @@ fn comes_before(a: u32, b: u32, first: u32, whole: bool) -> bool {
 
 // Returns the number of tiles along each side of a bin.
 fn side() -> u32 {
-    return frame.binning.x & 0xffu;
+    return bin_side(frame.binning);
 }
 
 // Returns the coordinates of a tile in its bin. Tiles are numbered row by row.
@@ -486,7 +487,7 @@ fn reserve(corner: vec2<u32>, thread: u32) {
 fn write_range(corner: vec2<u32>, number: u32, range: vec2<u32>) {
     let tile = corner + tile_in_bin(number);
     if number < side() * side() && all(tile < frame.tiles) {
-        tile_ranges[tile.y * frame.tiles.x + tile.x] = range;
+        tile_ranges[tile_index(tile, frame.tiles.x)] = range;
     }
 }
 
@@ -701,7 +702,7 @@ fn sort_bins(
 fn sort_bins(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
 #endif
     let first_bin = BIN_COUNTERS + frame.binning.w;
-    let grid = (frame.tiles + side() - 1u) / side();
+    let grid = bin_grid(frame.tiles, side());
     let bin = group.y * grid.x + group.x;
     let binned = bins[first_bin + bin];
     if thread == 0u {

@@ -56,17 +56,18 @@ pub(super) fn large_batches(limits: &wgpu::Limits, instances: &[Instance<'_>]) -
     few && limits.max_compute_workgroup_storage_size >= LARGE_BATCHES_MEMORY
 }
 
-/// Initial capacity of a bin in splats: all Gaussians divided by [`FIRST_DIVISOR`], but at least [`FIRST_CAPACITY`] and at most
-/// [`FIRST_OF_TILE`] for each tile. Few bins of few captures exceed it.
+/// Initial capacity of a bin in splats: all Gaussians divided by [`FIRST_DIVISOR`], but at least [`FIRST_CAPACITY`], at most [`FIRST_OF_TILE`]
+/// for each tile, and never more than all Gaussians or less than [`LEAST_CAPACITY`]. Few bins of few captures exceed it.
 const FIRST_CAPACITY: u32 = 4096;
 const FIRST_DIVISOR: u32 = 16;
 const FIRST_OF_TILE: u32 = 1024;
+const LEAST_CAPACITY: u32 = 256;
 
 /// Returns the initial capacity in splats of all bins together, before any splats have been counted.
 pub(super) fn first_guess(picture: UVec2, side: u32, slots: u32) -> u32 {
     let bins = bin_grid(picture, side).element_product();
     let capacity = (slots / FIRST_DIVISOR).clamp(FIRST_CAPACITY, FIRST_OF_TILE * side * side);
-    bins.saturating_mul(slots.min(capacity).max(256))
+    bins.saturating_mul(slots.min(capacity).max(LEAST_CAPACITY))
 }
 
 /// Entries of all bins together, up to which each bin has room for as many splats as the fullest: [`EQUAL_ROOMS`], or
@@ -77,13 +78,13 @@ const EQUAL_ROOMS_OF_PAIR: u32 = 4;
 
 /// Splats, the most at any time, from which on bins are counted before they are filled: in the first frames of a view, before the counts of a
 /// like frame are known, and in any frame. If a bin has no room, its tiles search all splats of the picture: with so many it takes seconds.
-const COUNTED_AT_FIRST: u32 = 1 << 18;
-const COUNTED: u32 = 1 << 21;
+const COUNTED_UNLESS_KNOWN: u32 = 1 << 18;
+const ALWAYS_COUNTED: u32 = 1 << 21;
 
 /// Returns whether the bins of a frame of captures with at most so many splats are counted before they are filled. `is_known` is whether the
 /// counts of a like frame are known.
 pub(super) fn counts_first(splats: usize, is_known: bool) -> bool {
-    splats >= if is_known { COUNTED } else { COUNTED_AT_FIRST } as usize
+    splats >= if is_known { ALWAYS_COUNTED } else { COUNTED_UNLESS_KNOWN } as usize
 }
 
 /// Returns the largest number of entries of all bins together with room for the same number of splats, in a view of so many pairs.

@@ -2,8 +2,7 @@
 //!
 //! In: a device. Out: [`BinLayouts`], in the order of the shaders' bindings.
 
-use crate::renderer::device::bind::Bind;
-use crate::renderer::device::bind::Bind::{Read, Uniform, UniformAt, Write};
+use crate::renderer::device::bind::Bind::{self, Read, Uniform, UniformAt, Write};
 use crate::renderer::device::bind::group_layout;
 use crate::renderer::layout::{FrameUniforms, INSTANCES_BOUND, MotionUniforms};
 

@@ -15,8 +15,9 @@
 //!
 //! Each bin is sorted by one workgroup, in workgroup memory. `blend_blocks` blends each tile in blocks of 8 x 4 pixels.
 //!
-//! All bins have room for as many splats as the fullest bin of earlier frames, and a reserve. Where this would take too much memory, since few bins
-//! are full, and where a bin without room would take seconds, since there are many splats, `project_bin` only counts the splats of each bin, and two more passes fill bins with room for exactly these:
+//! All bins have room for as many splats as the fullest bin of earlier frames, and a reserve. Where this would take too much memory, since
+//! few bins are full, and where a bin without room would take seconds, since there are many splats, `project_bin` only counts the splats of
+//! each bin, and two more passes fill bins with room for exactly these:
 //!
 //! | pass | reads | writes |
 //! |---|---|---|

@@ -4,8 +4,8 @@
 //!
 //! `sort_bins` and `colors` do not depend on each other and run at the same time, if each frame has its own encoder: wgpu inserts a barrier
 //! between two passes of an encoder for each buffer that the second pass writes and an earlier pass used. Therefore the counters of even and
-//! odd frames are in separate buffers, and so are splats and their colors. The bins are sorted first, since `sort_bins` occupies few threads
-//! for a long time: `colors` uses the remaining threads.
+//! odd frames are in separate buffers, and splats and their colors are in two buffers rather than one. The bins are sorted first, since
+//! `sort_bins` occupies few threads for a long time: `colors` uses the remaining threads.
 
 use super::bins::per_thread;
 use super::buffers::BinBuffers;

@@ -142,7 +142,7 @@ impl Scratch {
         Claim { _room: room, buffers }
     }
 
-    /// Returns whether a claim has the buffers that suit all views of today.
+    /// Returns whether a claim has the newest buffers, and these suit all views that exist now.
     pub(in crate::renderer) fn is_current(&self, claim: &Claim) -> bool {
         let claimed = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let suits = claimed.wanted().is_none_or(|wanted| claim.buffers.room.suits(wanted));

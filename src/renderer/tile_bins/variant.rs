@@ -56,7 +56,7 @@ impl Lists {
         let threads = limits.max_compute_workgroup_size_x.min(limits.max_compute_invocations_per_workgroup);
         if threads < 512 || memory < Self::Medium.memory() {
             Self::Short
-        } else if fullest <= 2304 || memory < Self::Long.memory() {
+        } else if fullest <= Self::Medium.sizes()[0] || memory < Self::Long.memory() {
             Self::Medium
         } else {
             Self::Long
