@@ -66,7 +66,8 @@ Examples:
   gs4d bake chkpnt30000.pth --data data/singer --audio singer.ogg -o singer.gs4d
   gs4d bake n3v.pth --data data/n3v --engine gpu --shards 8 -o n3v.gs4d --plan n3v.json
 
-Beside the package: OUT.report.html with plots and pictures (open it in a browser; it needs no network) and OUT.report.json.
+Beside a package NAME.gs4d: NAME.report.html with plots and pictures (open it in a browser; it needs no network) and
+NAME.report.json.
 Every choice is made on validation views, which nothing is trained on. The report compares the test views, which no choice depends on, if
 their images exist. Cameras and times of the training views are enough with --ratio or --keep; --max-loss needs their images, too.")]
 pub(crate) struct Bake {
@@ -89,11 +90,13 @@ pub(crate) struct Bake {
     /// cameras.
     #[arg(id = "static", long = "static", help_heading = "Data")]
     is_static: bool,
-    /// Number of Gaussians to train from pictures [default: 60000, and more for many large pictures of cameras that stand
-    /// still].
+    /// Number of Gaussians to train from pictures [default: 60000; for cameras that stand still and see the same
+    /// moments one for 32 pixels of a moment, for other opaque pictures one for 32 pixels of one picture of each
+    /// moment, up to 400000].
     #[arg(long, help_heading = "Training from pictures", value_name = "N", value_parser = values::count(100_000_000))]
     gaussians: Option<usize>,
-    /// Steps of training from pictures [default: 20000].
+    /// Steps of training from pictures [default: 10000 for cameras that stand still and see the same moments, else
+    /// 20000].
     #[arg(long, help_heading = "Training from pictures", value_name = "N", value_parser = values::count(100_000_000))]
     train_steps: Option<usize>,
     /// Rows of the environment map that is trained behind the Gaussians, as of gs4d train; 0: none [default: 32 if the

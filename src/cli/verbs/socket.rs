@@ -28,8 +28,8 @@ Examples:
   gs4d socket with-hand.gs4d --name hand --remove -o dancer.gs4d
   gs4d socket island.gs4d --points dataset/points.json
 
-Positions are in capture units, times are timestamps: gs4d info shows the bounds and the time interval. In Bevy, a child CaptureSocket(\"hand\")
-of the capture has the transform of the socket.")]
+Positions are in capture units, times are timestamps: gs4d info shows the bounds and the time interval. In Bevy, a child
+CaptureSocket::new(\"hand\") of the capture has the transform of the socket.")]
 pub(crate) struct SocketVerb {
     /// The package, or a capture of any other format. It stays as it is.
     #[arg(value_name = "SCENE")]

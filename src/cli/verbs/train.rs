@@ -70,7 +70,8 @@ pub(crate) struct Train {
     #[arg(long, value_name = "R,G,B", default_value = "0,0,0", value_parser = values::color, allow_hyphen_values = true)]
     background: [f32; 3],
     /// Number of Gaussians; with --densify original the most that there are at any step [default: 60000; for cameras
-    /// that stand still and see the same moments one for 32 pixels of a moment, up to 400000].
+    /// that stand still and see the same moments one for 32 pixels of a moment, for other opaque pictures one for 32
+    /// pixels of one picture of each moment, up to 400000].
     #[arg(long, value_name = "N", value_parser = values::count(100_000_000))]
     gaussians: Option<usize>,
     /// Where Gaussians are placed at the beginning: hull, inside the silhouettes of the images; points, at those of the
@@ -97,7 +98,7 @@ pub(crate) struct Train {
     /// color, else 0].
     #[arg(long, value_name = "ROWS", value_parser = clap::value_parser!(u32).range(0..=4096))]
     environment: Option<u32>,
-    /// Number of training steps [default: 20000].
+    /// Number of training steps [default: 10000 for cameras that stand still and see the same moments, else 20000].
     #[arg(long, value_name = "N", value_parser = values::count(100_000_000))]
     steps: Option<usize>,
     /// Factor on all rates at the last step. The factor falls from 1; 1 keeps the rates constant.
