@@ -1,7 +1,7 @@
 //! Selecting training views.
 //!
 //! In: the training views of a dataset. Out: an even subset of the views, their distinct cameras, the camera of each
-//! view, the number of their distinct times.
+//! view, the number of their distinct times and of their moments.
 
 use super::TrainingView;
 use crate::view::{Camera, Lens, Optics, View};
@@ -75,6 +75,31 @@ pub fn distinct_times(views: &[TrainingView]) -> usize {
     views.iter().map(|view| view.time.to_bits()).collect::<HashSet<_>>().len()
 }
 
+/// Returns the median distance of two times of a camera that follow each other; of all views, if no camera has two; the
+/// whole unit of time if all views are of one moment.
+pub fn distance_of_moments(views: &[TrainingView], cameras: &[u32]) -> f32 {
+    let gaps = |mut times: Vec<(u32, f32)>| -> Vec<f32> {
+        times.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        let of_one = times.windows(2).filter(|pair| pair[0].0 == pair[1].0);
+        of_one.map(|pair| pair[1].1 - pair[0].1).filter(|gap| *gap > 0.0).collect()
+    };
+    let mut found = gaps(cameras.iter().zip(views).map(|(&camera, view)| (camera, view.time)).collect());
+    if found.is_empty() {
+        found = gaps(views.iter().map(|view| (0, view.time)).collect());
+    }
+    found.sort_by(f32::total_cmp);
+    found.get(found.len() / 2).copied().unwrap_or(1.0)
+}
+
+/// Returns the number of moments of the views: times of one frame of several cameras, whose clocks may differ by a part of
+/// it, are one moment.
+pub fn moments(views: &[TrainingView]) -> usize {
+    let times = || views.iter().map(|view| view.time);
+    let (Some(first), Some(last)) = (times().reduce(f32::min), times().reduce(f32::max)) else { return 0 };
+    let distances = (last - first) / distance_of_moments(views, &camera_numbers(views));
+    distinct_times(views).min(distances.round() as usize + 1)
+}
+
 /// Returns the renderer's view for each training view of a capture with these optics.
 pub fn to_draw(views: &[TrainingView], optics: impl Into<Optics>) -> Vec<View> {
     let optics = optics.into();
@@ -113,6 +138,17 @@ mod tests {
         let numbers: Vec<u32> = (0..600).map(|index| index / 30).collect();
         assert_eq!(camera_numbers(&views), numbers, "twenty cameras");
         assert_eq!(distinct_cameras(&views).len(), 20, "the same cameras");
+    }
+
+    #[test]
+    fn clocks_that_differ_by_parts_of_a_frame_make_no_more_moments() {
+        let mut views = views();
+        assert_eq!(moments(&views), 30, "one clock");
+        views.iter_mut().enumerate().for_each(|(index, view)| view.time += 0.02 / 29.0 * (index / 30) as f32);
+        assert_eq!(distinct_times(&views), 600, "each camera has times of its own");
+        assert_eq!(moments(&views), 30, "twenty clocks");
+        assert_eq!(moments(&views[..1]), 1, "one picture");
+        assert_eq!(moments(&[]), 0, "none");
     }
 
     #[test]

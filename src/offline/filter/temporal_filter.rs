@@ -6,7 +6,7 @@
 use super::FilterError;
 use super::visibility_masks::{VisibilityMasks, mask_views};
 use crate::offline::dataset::TrainingView;
-use crate::offline::dataset::selection::{distinct_cameras, distinct_times, to_draw};
+use crate::offline::dataset::selection::{distinct_cameras, moments, to_draw};
 use crate::offline::engine::Engine;
 use crate::offline::engine::Purpose;
 use crate::offline::engine::memory::Pictures;
@@ -38,7 +38,7 @@ pub fn needs_views(kind: FilterKind) -> bool {
 pub enum KeyFrames {
     /// This number of key-frames.
     Count(u32),
-    /// One key-frame for each group of this number of timestamps of the training views.
+    /// One key-frame for each group of this number of moments of the training views.
     Every(usize),
 }
 
@@ -54,7 +54,7 @@ impl KeyFrames {
     pub fn count(self, views: &[TrainingView]) -> usize {
         match self {
             Self::Count(count) => count as usize,
-            Self::Every(frames) => keys_every(distinct_times(views), frames),
+            Self::Every(frames) => keys_every(moments(views), frames),
         }
     }
 }

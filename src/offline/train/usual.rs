@@ -3,15 +3,15 @@
 //! In: the training views of a dataset. Out: [`Usual`]: the number of Gaussians and of steps, and whether real cameras
 //! may have filmed it.
 //!
-//! A *rig* is several cameras that stand still and see the same moments, each with an image that covers all of its
-//! pixels. Its pictures differ in exposure and white balance, and its moments share what stands. Other opaque pictures
-//! show surroundings, of which each moment may show others. All other datasets, such as a camera that moves around an
-//! object on a background that is left out, are trained as in the paper.
+//! A *rig* is several cameras that stand still and see the same moments, without masks. Its pictures differ in exposure
+//! and white balance, and its moments share what stands. Other opaque pictures show surroundings, of which each moment
+//! may show others. All other datasets, such as a camera that moves around an object on a background that is left out,
+//! are trained as in the paper.
 
 use super::error::TrainError;
 use super::every_view::every_view;
 use crate::offline::dataset::TrainingView;
-use crate::offline::dataset::selection::{distinct_cameras, distinct_times};
+use crate::offline::dataset::selection::{distinct_cameras, moments};
 use crate::offline::dataset::splits::SplitOptions;
 use crate::offline::picture_file;
 use crate::offline::work::Progress;
@@ -58,7 +58,7 @@ impl Usual {
 
     /// Returns the usual choices for these training views.
     pub fn of(views: &[TrainingView]) -> Self {
-        let (cameras, moments) = (distinct_cameras(views), distinct_times(views));
+        let (cameras, moments) = (distinct_cameras(views), moments(views));
         // Sparse views of many moments are of cameras that move.
         let is_dense = 2 * views.len() >= cameras.len() * moments;
         if views.iter().any(|view| view.mask.is_some()) {
@@ -137,6 +137,9 @@ mod tests {
         let rig = Usual::of(&views(27, 30, 1));
         assert_eq!((rig.gaussians, rig.is_rig), (27 * 640 * 360 / 32, true), "by the pixels of a moment");
         assert_eq!(Usual::of(&views(4, 10, 1)).gaussians, 60_000, "at least as many as usual");
+        let mut clocks = views(6, 30, 1);
+        clocks.iter_mut().enumerate().for_each(|(index, view)| view.time += 0.13 * (index / 30) as f32);
+        assert!(Usual::of(&clocks).is_rig, "clocks that differ by parts of a frame");
         for (cameras, moments, every) in [(2, 30, 1), (71, 1, 1), (30, 30, 30)] {
             assert_eq!(
                 Usual::of(&views(cameras, moments, every)),

@@ -8,7 +8,7 @@
 
 use super::evaluation::{behind, color_behind};
 use super::session::Session;
-use crate::offline::dataset::selection::camera_numbers;
+use crate::offline::dataset::selection::{camera_numbers, distance_of_moments};
 use crate::offline::dataset::{DatasetError, TrainingView};
 use crate::offline::train::densification::{Births, Floaters};
 use crate::offline::train::error::TrainError;
@@ -217,22 +217,6 @@ impl Moments {
         let rounds = self.own.len().div_ceil(wanted).max(1);
         self.own.iter().skip(number % rounds * wanted).take(wanted)
     }
-}
-
-/// Returns the median distance of two times of a camera that follow each other; of all views, if no camera has two; the
-/// whole unit of time if all views are of one moment.
-fn distance_of_moments(views: &[TrainingView], cameras: &[u32]) -> f32 {
-    let gaps = |mut times: Vec<(u32, f32)>| -> Vec<f32> {
-        times.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
-        let of_one = times.windows(2).filter(|pair| pair[0].0 == pair[1].0);
-        of_one.map(|pair| pair[1].1 - pair[0].1).filter(|gap| *gap > 0.0).collect()
-    };
-    let mut found = gaps(cameras.iter().zip(views).map(|(&camera, view)| (camera, view.time)).collect());
-    if found.is_empty() {
-        found = gaps(views.iter().map(|view| (0, view.time)).collect());
-    }
-    found.sort_by(f32::total_cmp);
-    found.get(found.len() / 2).copied().unwrap_or(1.0)
 }
 
 #[cfg(test)]

@@ -27,8 +27,9 @@ const AXES: [UpAxis; 6] = [UpAxis::PosX, UpAxis::NegX, UpAxis::PosY, UpAxis::Neg
 /// coordinates of the dataset.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct CaptureSettings {
-    /// First and last time, as the dataset counts times; `None`: 0 to 1 if no view is outside, frames are not numbered
-    /// and times have no origin of their own, else from the first to the last time of the views.
+    /// First and last time, as the dataset counts times; `None`: 0 to 1 if no view is outside, frames are not numbered,
+    /// times have no origin of their own, and they span at least a tenth or are all the same; else from the first to the
+    /// last time of the views.
     pub time_interval: Option<[f64; 2]>,
     /// Background color, in the space of the images.
     pub background: [f32; 3],
@@ -106,8 +107,8 @@ fn counted_from(origin: f64, interval: [f64; 2]) -> Result<[f32; 2], StartError>
     if is_whole { Ok([first, last]) } else { Err(StartError::Interval { interval }) }
 }
 
-/// Returns 0 to 1 if no view is outside, frames are not numbered, and the views are of a tenth of it or of one time; else the first and the last time, or one unit from
-/// the only time.
+/// Returns 0 to 1 if all times are between 0 and 1, frames are not numbered, and the times span at least a tenth or are all
+/// the same; else the first and the last time, or one unit from the only time.
 fn interval(views: &[TrainingView], is_numbered: bool) -> [f32; 2] {
     let times = || views.iter().map(|view| view.time);
     let [first, last] = [times().fold(f32::INFINITY, f32::min), times().fold(f32::NEG_INFINITY, f32::max)];
