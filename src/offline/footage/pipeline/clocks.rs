@@ -37,6 +37,8 @@ pub(super) struct Clocks {
     /// By how many frames each camera is still too late, by the motion in its pictures; `None` where that does not
     /// tell, and for cameras for the test.
     pub left: Vec<Option<f64>>,
+    /// Whether a comparison failed that another run may be able to make, as with a program that is installed by then.
+    pub is_provisional: bool,
 }
 
 impl Clocks {
@@ -69,7 +71,7 @@ impl Clocks {
     /// Returns clocks that are right.
     fn right(source: &Source, way: &str) -> Self {
         let offsets = vec![0.0; source.cameras.len()];
-        Self { way: way.to_owned(), offsets, residuals: Vec::new(), left: Vec::new() }
+        Self { way: way.to_owned(), offsets, residuals: Vec::new(), left: Vec::new(), is_provisional: false }
     }
 
     /// Returns the offsets that are given, 0 for other cameras.
@@ -108,7 +110,7 @@ impl Clocks {
             Err(DatasetError::Interrupted(interrupted)) => return Err(interrupted.into()),
             Err(error) => {
                 progress.note(&format!("note: clocks are not compared by sound: {error}"));
-                return Ok(Self::right(source, "not compared"));
+                return Ok(Self { is_provisional: true, ..Self::right(source, "not compared") });
             }
         };
         let of = |video: &Option<PathBuf>| video.as_ref().and_then(|_| found.next().flatten());

@@ -38,6 +38,8 @@ pub(super) struct Cloud {
     pub points: usize,
     /// The hash of the file; `None` if there are no points.
     hash: Option<Vec<u8>>,
+    /// Whether few points stand still, and COLMAP was not there to find more.
+    lacks_matches: bool,
 }
 
 impl Cloud {
@@ -55,15 +57,15 @@ impl Cloud {
     ) -> Result<Self, FootageError> {
         let out = &settings.out;
         let (take, path) = (seen.0, out.join(FILE));
-        let Standing { points, backdrops } = what_stands((take, working), known, out, progress)?;
+        let (Standing { points, backdrops }, lacks_matches) = what_stands((take, working), known, out, progress)?;
         let moving = moving((seen, &backdrops), working, settings, progress)?;
         let TakePoints { points } = TakePoints::joined(moving, points);
         if points.is_empty() {
-            return Self::none(out);
+            return Ok(Self { lacks_matches, ..Self::none(out)? });
         }
         let middle = take.moments.first().zip(take.moments.last()).map_or(0.0, |(first, last)| first.midpoint(*last));
         write(&path, &points, &Origin::default(), middle)?;
-        Ok(Self { points: points.len(), hash: Some(Key::of_file(&path)?.bytes().to_vec()) })
+        Ok(Self { points: points.len(), hash: Some(Key::of_file(&path)?.bytes().to_vec()), lacks_matches })
     }
 
     /// Removes the file of an earlier run, if there is one.
@@ -74,7 +76,7 @@ impl Cloud {
         let path = out.join(FILE);
         match fs::remove_file(&path) {
             Err(error) if error.kind() != ErrorKind::NotFound => Err(FileError::at(&path, error).into()),
-            _ => Ok(Self { points: 0, hash: None }),
+            _ => Ok(Self { points: 0, hash: None, lacks_matches: false }),
         }
     }
 
@@ -82,6 +84,11 @@ impl Cloud {
     pub(super) fn is_in(&self, out: &Path) -> bool {
         let found = Key::of_file(&out.join(FILE)).ok().map(|key| key.bytes().to_vec());
         found == self.hash
+    }
+
+    /// Returns whether COLMAP was not there to find more points, and is now.
+    pub(super) fn can_be_completed(&self) -> bool {
+        self.lacks_matches && Program::find().is_ok()
     }
 
     /// Returns the name of the file, if there are points.
@@ -110,13 +117,14 @@ fn moving(
 }
 
 /// Returns what stands still: what the plates show, else the points that are known, else the points that the first
-/// pictures of the cameras show, which may also show what moves. If cameras are too far apart for that, by matches.
+/// pictures of the cameras show, which may also show what moves. If cameras are too far apart for that, by matches. Returns
+/// also whether matches would have been needed, and COLMAP is not installed.
 fn what_stands(
     (take, working): (&Take, &WorkingPictures),
     known: Option<&(PathBuf, Origin)>,
     out: &Path,
     progress: &mut dyn Progress,
-) -> Result<Standing, FootageError> {
+) -> Result<(Standing, bool), FootageError> {
     let plate = |camera: &Filmed| -> Result<Option<Plate>, FootageError> {
         let of = |(picture, confidence)| Plate { camera: camera.camera, picture, confidence };
         Ok(read_plate(out, camera)?.map(of))
@@ -128,7 +136,7 @@ fn what_stands(
         if let Some((path, origin)) = known {
             let mut points = PointCloud::load(path, origin)?.0;
             points.retain(|point| point.time.is_none());
-            return Ok(Standing { points, backdrops: Vec::new() });
+            return Ok((Standing { points, backdrops: Vec::new() }, false));
         }
         let step = take.cameras.len().div_ceil(MOST_PICTURES).max(1);
         let cameras: Vec<&Filmed> = take.cameras.iter().step_by(step).collect();
@@ -144,18 +152,26 @@ fn what_stands(
     if !is_of_plates {
         found.backdrops.clear();
     }
-    if found.points.len() < FEW {
-        found.points.extend(matched(plates, progress)?);
+    if found.points.len() >= FEW {
+        return Ok((found, false));
     }
-    Ok(found)
+    let Ok(program) = Program::find() else {
+        progress.note("note: few points stand still, and COLMAP, which would find more by matches, is not installed");
+        return Ok((found, true));
+    };
+    found.points.extend(matched(&program, plates, progress)?);
+    Ok((found, false))
 }
 
-/// Returns the points of matches of pictures that COLMAP finds; none if it is not installed or fails.
-fn matched(plates: Vec<Plate>, progress: &mut dyn Progress) -> Result<Vec<CloudPoint>, FootageError> {
-    let Ok(program) = Program::find() else { return Ok(Vec::new()) };
+/// Returns the points of matches of pictures that COLMAP finds; none if it fails.
+fn matched(
+    program: &Program,
+    plates: Vec<Plate>,
+    progress: &mut dyn Progress,
+) -> Result<Vec<CloudPoint>, FootageError> {
     let pictures: Vec<(Camera, RgbImage)> = plates.into_iter().map(|plate| (plate.camera, plate.picture)).collect();
     // Points of plates have no time.
-    match triangulated(&program, &pictures, 0.0, progress) {
+    match triangulated(program, &pictures, 0.0, progress) {
         Ok(points) => Ok(points),
         Err(ColmapError::Interrupted(interrupted)) => Err(interrupted.into()),
         Err(error) => {

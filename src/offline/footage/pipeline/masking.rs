@@ -116,6 +116,14 @@ pub(super) fn write_masks(
     let out = &settings.out;
     let standing: Vec<&Filmed> = take.cameras.iter().filter(|camera| camera.frames.len() >= FEWEST).collect();
     let [plates, motion] = [Unfinished::begin(out, PLATES)?, Unfinished::begin(out, MOTION)?];
+    for camera in take.cameras.iter().filter(|camera| camera.frames.len() < FEWEST) {
+        // Too few frames for a plate: what moves is known of those with a given mask.
+        for frame in &camera.frames {
+            let Some(mask) = given.map_or(Ok(None), |given| given.mask(camera, frame, names))? else { continue };
+            let path = motion.path(&camera.name, &file_name(frame, names))?;
+            mask.save(&path).map_err(|error| of_image(&path, error))?;
+        }
+    }
     progress.begin("plates and masks", standing.iter().map(|camera| camera.frames.len()).sum());
     for camera in standing {
         proceed(progress)?;

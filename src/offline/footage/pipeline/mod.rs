@@ -138,7 +138,7 @@ fn run(
 
     let (masked, masks_key) = separate(settings, (seen, &working), pictures, stages)?;
     let seen_key = masks_key.with(Key::of_views(&source.views()));
-    let is_there = |Text(cloud): &Text<Cloud>| cloud.is_in(out);
+    let is_there = |Text(cloud): &Text<Cloud>| cloud.is_in(out) && !cloud.can_be_completed();
     let find = |progress: &mut dyn Progress| match settings.points {
         true => Cloud::write(seen, &working, source.points.as_ref(), settings, progress).map(Text),
         false => Cloud::none(out).map(Text),
@@ -219,7 +219,8 @@ fn compare_clocks(
     let key = pictures.with(Key::of_views(&source.views())).with(Key::of_files(&videos)?);
     let key = key.and(&format!("{:?} {:?}", settings.sync, settings.offsets));
     let compare = |progress: &mut dyn Progress| Clocks::of(source, settings, working, progress).map(Text);
-    let (Text(clocks), key) = stages.run("sync", key, |_| true, compare)?;
+    let is_final = |Text(clocks): &Text<Clocks>| !clocks.is_provisional;
+    let (Text(clocks), key) = stages.run("sync", key, is_final, compare)?;
     Ok((clocks, key))
 }
 

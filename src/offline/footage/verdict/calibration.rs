@@ -189,9 +189,9 @@ fn exchanged(names: &[&str], hulls: &Hulls<'_>, together: f32) -> Option<Finding
     let pairs = (0..names.len()).flat_map(|a| (a + 1..names.len()).map(move |b| (a, b)));
     let agreement = |(a, b): (usize, usize)| {
         let mut exchanged = moments.to_vec();
-        let equal = exchanged.iter_mut().all(|all| Silhouette::exchange(all, a, b));
+        exchanged.iter_mut().try_for_each(|all| Silhouette::exchange(all, a, b))?;
         let hulls = Hulls { moments: &exchanged, ..*hulls };
-        let agreement = hulls.medians(|hull| vec![hull.agreement(None)]).filter(|_| equal)?;
+        let agreement = hulls.medians(|hull| vec![hull.agreement(None)])?;
         Some((a, b, *agreement.first()?))
     };
     let (a, b, best) = pairs.filter_map(agreement).max_by(|a, b| a.2.total_cmp(&b.2))?;
@@ -211,7 +211,7 @@ mod tests {
     use super::super::evidence::tests::{evidence, seen, textured};
     use super::super::geometry::Projector;
     use super::*;
-    use glam::Mat4;
+    use glam::{Mat4, UVec2};
     use image::{GrayImage, Luma};
 
     /// Returns a ring of cameras that have seen two balls at two moments.
@@ -258,6 +258,20 @@ mod tests {
         all.cameras[2].camera = camera;
         let found = calibration(&all).expect("two are exchanged");
         assert_eq!(found.cameras, ["cam1", "cam2"], "{found}");
+    }
+
+    #[test]
+    fn cameras_with_pictures_of_other_sizes_are_not_exchanged() {
+        let mut all = ring(5);
+        let seen = &mut all.cameras[4];
+        let size = seen.camera.size - UVec2::new(0, seen.camera.size.y / 4);
+        seen.camera.size = size;
+        let cut = |mask: &GrayImage| image::imageops::crop_imm(mask, 0, 0, size.x, size.y).to_image();
+        seen.samples.iter_mut().for_each(|sample| sample.mask = sample.mask.as_ref().map(cut));
+        let turned = Mat4::from_rotation_y(25.0_f32.to_radians()) * all.cameras[1].camera.world_to_camera;
+        all.cameras[1].camera.world_to_camera = turned;
+        let found = calibration(&all).expect("one is off by 25 degrees");
+        assert!(!found.cameras.contains(&"cam4".to_owned()), "the one with the smaller pictures is right: {found}");
     }
 
     #[test]

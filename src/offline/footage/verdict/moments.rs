@@ -114,8 +114,10 @@ fn missing(seen: &Seen, moments: usize) -> Option<Finding> {
     if late > 1 {
         parts.push(format!("begins late, at moment {first}"));
     }
-    if parts.is_empty() || within > 0 {
+    if within > 0 {
         parts.push("lacks frames within".to_owned());
+    } else if parts.is_empty() {
+        parts.push("begins a moment late and ends a moment early".to_owned());
     }
     let severity = if absent as f32 >= GRAVE * moments as f32 { Severity::Grave } else { Severity::Warning };
     let what = format!("The video of {name} {}: {absent} of {moments} moments are missing.", parts.join(" and "));
@@ -194,6 +196,16 @@ mod tests {
         let found = moments(&all);
         assert_eq!(found.len(), 1, "one finding: {found:?}");
         assert!(found[0].what.contains("cam3 ends early, after moment 6 of 11: 5 of 12"), "{}", found[0]);
+    }
+
+    #[test]
+    fn a_video_that_begins_and_ends_within_the_others_is_named() {
+        let mut all = take(|_, _| false);
+        all.cameras[3].moments.remove(0);
+        all.cameras[3].moments.pop();
+        let found = moments(&all);
+        assert_eq!(found.len(), 1, "one finding: {found:?}");
+        assert!(found[0].what.contains("cam3 begins a moment late and ends a moment early: 2 of 12"), "{}", found[0]);
     }
 
     #[test]

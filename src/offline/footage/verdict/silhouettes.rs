@@ -41,12 +41,13 @@ impl Silhouette {
         Self { projector, mask: inside, wider }
     }
 
-    /// Exchanges the masks of two cameras whose pictures have one size; returns whether they have.
-    pub(super) fn exchange(silhouettes: &mut [Self], a: usize, b: usize) -> bool {
+    /// Exchanges the masks of two cameras; `None`, without an exchange, if their pictures have different sizes.
+    pub(super) fn exchange(silhouettes: &mut [Self], a: usize, b: usize) -> Option<()> {
         let (of_a, of_b) = (silhouettes[a].projector, silhouettes[b].projector);
-        silhouettes[a].projector = of_b;
-        silhouettes[b].projector = of_a;
-        of_a.size == of_b.size
+        (of_a.size == of_b.size).then(|| {
+            silhouettes[a].projector = of_b;
+            silhouettes[b].projector = of_a;
+        })
     }
 }
 
