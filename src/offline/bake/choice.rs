@@ -9,6 +9,7 @@ use super::BakeError;
 use super::inputs::Inputs;
 use super::job::{Scoring, shard_name};
 use super::merged_scores::merged_scores;
+use super::settings::BakeSettings;
 use super::size::count_of_size;
 use super::trained_search::TrainedSearch;
 use super::tuning::short;
@@ -89,8 +90,10 @@ pub(super) fn choose(
     scores_key: Key,
 ) -> Result<(Choice, Key), BakeError> {
     let settings = inputs.settings;
-    let options = format!("{:?} {:?} {:?} {:?}", settings.goal, inputs.tunes(), settings.quality, settings.key_frames);
-    let key = scores_key.with(inputs.image_keys[1]).and(&options);
+    let BakeSettings { goal, quality, key_frames, order, level, .. } = settings;
+    let options = format!("{goal:?} {:?} {quality:?} {key_frames:?} {order:?} {level:?}", inputs.tunes());
+    // Equal scores may be those of other inputs.
+    let key = scores_key.with(inputs.scene_key).with(inputs.cameras_key).with(inputs.image_keys[1]).and(&options);
     let key = if trains(inputs, scores, settings.goal) { key.with(inputs.image_keys[0]) } else { key };
     let (Text(choice), _) =
         stages.run("prune", key, |_| true, |progress| search(inputs, scores, progress).map(Text))?;

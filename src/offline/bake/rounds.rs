@@ -31,7 +31,10 @@ pub(super) fn thin(
     let key = choice.with(inputs.scene_key).and(&format!("{} Gaussians", kept.len()));
     match (inputs.tunes().filter(|_| rounds > 1), score.parse::<Variant>()) {
         (Some(tuning), Ok(variant)) => {
-            let key = key.with(inputs.images_key()).and(&format!("{rounds} rounds of {tuning:?} by {variant:?}"));
+            let key = key
+                .with(inputs.cameras_key)
+                .with(inputs.images_key())
+                .and(&format!("{rounds} rounds of {tuning:?} by {variant:?}"));
             stages.run(
                 "rounds",
                 key,

@@ -31,8 +31,10 @@ pub(super) struct Attempts {
 impl Attempts {
     /// Returns the attempts of an interrupted bake with the same inputs, or none, given the key of the choice.
     pub(super) fn load(inputs: &Inputs<'_>, choice: Key, first: usize) -> Self {
-        let BakeSettings { rounds, filter, level, .. } = inputs.settings;
-        let key = choice.and(&format!("attempts {rounds} {filter:?} {level:?} {:?}", inputs.tunes()));
+        let BakeSettings { rounds, filter, level, goal, quality, order, key_frames, colliders, .. } = inputs.settings;
+        let of_training = format!("attempts {rounds} {filter:?} {level:?} {:?}", inputs.tunes());
+        let key = choice.with(inputs.scene_key).with(inputs.cameras_key).with(inputs.images_key());
+        let key = key.and(&format!("{of_training} {goal:?} {quality:?} {order:?} {key_frames:?} {colliders:?}"));
         Self::of(&inputs.store, key, first)
     }
 

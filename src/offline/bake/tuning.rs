@@ -47,7 +47,7 @@ pub(super) fn fine_tune(
         stages.leave_out("fine-tune", inputs.reason_to_leave_out().as_deref());
         return Ok((scene, None, key));
     };
-    let key = key.with(inputs.images_key()).and(&format!("{tuning:?}"));
+    let key = key.with(inputs.cameras_key).with(inputs.images_key()).and(&format!("{tuning:?}"));
     let ((Text(tuning), scene), key) = stages.run(
         "fine-tune",
         key,
