@@ -5,7 +5,7 @@
 
 use super::component::Playback;
 use crate::plugin::asset::send;
-use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
+use crate::plugin::component::{GaussianCapture, GaussianCapture3d, StreamedPicture};
 use crate::scene::{ColliderMesh, Colliders};
 use bevy::asset::{Assets, RenderAssetUsages};
 use bevy::camera::visibility::Visibility;
@@ -188,7 +188,7 @@ impl Held {
 /// Gives each entity with a collider the mesh of the time of its capture.
 pub(super) fn update_colliders(
     captures: Res<Assets<GaussianCapture>>,
-    players: Query<(Entity, &GaussianCapture3d, &Playback)>,
+    players: Query<(Entity, &GaussianCapture3d, &Playback, Option<&StreamedPicture>)>,
     mut placed: Query<(Entity, &CaptureCollider, Option<&ChildOf>, &mut ColliderState)>,
     mut commands: Commands,
     mut changes: MessageWriter<CaptureColliderChanged>,
@@ -198,8 +198,9 @@ pub(super) fn update_colliders(
         let player = parent.and_then(|parent| players.get(parent.parent()).ok());
         let found = match player {
             None => Err(Lack::Capture),
-            Some((capture, handle, playback)) => {
-                captures.get(&handle.0).map(|loaded| Held::of(capture, *collider, loaded, playback.time)).transpose()
+            Some((capture, handle, playback, picture)) => {
+                let seconds = StreamedPicture::drawn(picture, playback.time);
+                captures.get(&handle.0).map(|loaded| Held::of(capture, *collider, loaded, seconds)).transpose()
             }
         };
         let lack = found.as_ref().err().copied();

@@ -4,7 +4,7 @@
 //! whether the point is there at that time ([`SocketState`]).
 
 use super::component::Playback;
-use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
+use crate::plugin::component::{GaussianCapture, GaussianCapture3d, StreamedPicture};
 use crate::scene::SocketSample;
 use bevy::asset::Assets;
 use bevy::camera::visibility::Visibility;
@@ -87,13 +87,16 @@ enum Lack {
 /// Gives each entity with a socket the transform of the socket at the time of its capture.
 pub(super) fn place_sockets(
     captures: Res<Assets<GaussianCapture>>,
-    players: Query<(&GaussianCapture3d, &Playback)>,
+    players: Query<(&GaussianCapture3d, &Playback, Option<&StreamedPicture>)>,
     mut placed: Query<(Entity, &CaptureSocket, Option<&ChildOf>, &mut Transform, &mut SocketState)>,
 ) {
     let _span = debug_span!("gs4d/sockets").entered();
     for (entity, CaptureSocket(name), parent, mut transform, mut state) in &mut placed {
         let player = parent.and_then(|parent| players.get(parent.parent()).ok());
-        let found = match player.map(|(handle, playback)| (captures.get(&handle.0), playback.time)) {
+        let seen = |(handle, playback, picture): (&GaussianCapture3d, &Playback, Option<&StreamedPicture>)| {
+            (captures.get(&handle.0), StreamedPicture::drawn(picture, playback.time))
+        };
+        let found = match player.map(seen) {
             None => Err(Lack::Capture),
             Some((None, _)) => Ok(SocketState::Waiting),
             Some((Some(capture), seconds)) => sample(capture, name, seconds).map(|sample| match sample {

@@ -37,7 +37,7 @@ fn add(app: &mut App) {
         .add_message::<CaptureBuffering>()
         .add_message::<CaptureBuffered>()
         .add_message::<CaptureStalled>()
-        .configure_sets(Update, CaptureStreamSystems.after(PlaybackSystems::Advance))
+        .configure_sets(Update, CaptureStreamSystems.after(PlaybackSystems::Advance).before(PlaybackSystems::Colliders))
         .add_systems(Update, begin_pictures.before(PlaybackSystems::Advance))
         .add_systems(Update, (fetch_files, show_pictures).chain().in_set(CaptureStreamSystems));
 }
