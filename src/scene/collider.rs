@@ -22,7 +22,8 @@ pub struct ColliderStretch {
     pub from: f32,
     /// The end, timestamp units; it belongs to the next stretch, if there is one.
     pub to: f32,
-    /// What is solid at any time between them. May be empty.
+    /// What is solid at any of the moments at which it was looked at: by `gs4d collide` five in a stretch, both ends
+    /// included. May be empty.
     pub mesh: ColliderMesh,
 }
 

@@ -129,8 +129,8 @@ impl TemporalFilter {
         count.div_ceil(32)
     }
 
-    /// Returns the times between which Gaussian `index` exists; all times unless the filter is of
-    /// [windows](FilterKind::Window).
+    /// Returns the first and the last time at which Gaussian `index` exists; all times unless the filter is of
+    /// [windows](FilterKind::Window). The end of a segment belongs to the next one, except that of the last.
     ///
     /// # Panics
     /// If `index` is out of range.
@@ -141,7 +141,8 @@ impl TemporalFilter {
         let [start, end] = interval.map(f64::from);
         let (first, last) = (words[index] & 0xffff, words[index] >> 16);
         let time = |segment: u32| start + (end - start) * f64::from(segment) / f64::from(self.segments);
-        [time(first), time(last + 1)]
+        let end = time(last + 1);
+        [time(first), if last + 1 < self.segments { end.next_down() } else { end }]
     }
 
     /// Returns the segment of `time`, which is in the capture's unit; see [`segment_of`].
@@ -289,6 +290,16 @@ pub fn segment_of(time: f32, interval: [f32; 2], segments: u32) -> u32 {
 mod tests {
     use super::*;
     use crate::gaussian::MARGINAL_CUTOFF;
+
+    #[test]
+    fn the_end_of_a_window_belongs_to_the_next() {
+        let sets = ActiveSets::Intervals(vec![0, 1 | 1 << 16]);
+        let filter = TemporalFilter { kind: FilterKind::Window, segments: 2, count: 2, sets };
+        let [before, after] = [0, 1].map(|index| filter.window(index, [0.0, 1.0]));
+        assert!(before[1] < 0.5 && before[1] > 0.499_999, "the first ends before the border: {before:?}");
+        assert_eq!(after, [0.5, 1.0], "the second has it, and the end of all");
+        assert_eq!(filter.segment_of(0.5, [0.0, 1.0]), 1, "as it is drawn");
+    }
 
     fn gaussian(mean_t: f32, sigma_t: f32) -> Gaussian {
         Gaussian { mean_t, sigma_t, opacity: 0.5, ..bytemuck::Zeroable::zeroed() }

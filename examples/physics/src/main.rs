@@ -34,6 +34,8 @@ const USAGE: &str = "physics CAPTURE [--balls N] [--headless]";
 const RUN: Duration = Duration::from_secs(20);
 /// Time in which the balls are dropped; frames are timed in the rest.
 const DROPPING: Duration = Duration::from_secs(10);
+/// Most balls: each has a ray that looks for the ground.
+const MOST_BALLS: usize = 100_000;
 /// A frame.
 const FRAME: Duration = Duration::from_nanos(16_666_667);
 
@@ -125,7 +127,9 @@ fn parse() -> Result<Settings> {
             "--headless" => headless = true,
             "--balls" => {
                 let count = arguments.next().and_then(|count| count.parse::<usize>().ok());
-                balls = count.filter(|count| *count > 0).ok_or("--balls needs a number, 1 or more")?;
+                balls = count
+                    .filter(|count| (1..=MOST_BALLS).contains(count))
+                    .ok_or("--balls needs a number, 1 to 100000")?;
             }
             option if option.starts_with('-') => return Err(format!("{option}: no such option: {USAGE}").into()),
             _ if file.is_some() => return Err(format!("{argument}: more than one capture: {USAGE}").into()),
@@ -224,7 +228,7 @@ fn lay_out(
     let radius = size.max_element() / 50.0;
     let place = |index: usize| {
         // A sequence that fills the square evenly.
-        let [u, v] = [0.754_877_7, 0.569_840_3].map(|step: f32| (0.5 + step * index as f32).fract());
+        let [u, v] = [0.754_877_7, 0.569_840_3].map(|step: f64| (0.5 + step * index as f64).fract() as f32);
         Vec3::new(low.x + size.x * u, high.y + 2.0 * radius, low.z + size.z * v)
     };
     let places: Vec<Vec3> = (0..8 * settings.balls)
@@ -311,7 +315,7 @@ fn judge(app: &mut App) -> Result<ExitCode> {
 }
 
 /// Runs the rest of the time, and returns the milliseconds of the frames without another mesh, of those with one, and
-/// of those that follow these.
+/// of those that follow these. Each has the update of no time that a step begins with, too.
 fn times_of_frames(app: &mut App) -> Result<[Vec<f64>; 3]> {
     let mut times = [const { Vec::new() }; 3];
     let mut follows = false;

@@ -35,7 +35,7 @@ pub struct Collided {
 /// are one.
 ///
 /// # Errors
-/// Settings out of their range, a capture in which nothing is solid, stretches or meshes beyond the limits of
+/// Settings out of their range, a capture whose parts do not fit together or in which nothing is solid, stretches or meshes beyond the limits of
 /// [`Colliders`], a Gaussian that cannot be drawn, an interruption.
 pub fn collide(
     scene: &GaussianScene,
@@ -43,6 +43,7 @@ pub fn collide(
     progress: &mut dyn Progress,
 ) -> Result<Collided, CollideError> {
     settings.check()?;
+    scene.check().map_err(CollideError::Invalid)?;
     let clip = Clip::of(scene, settings.rate)?;
     let drawn = drawn(scene)?;
     let grid = Grid::of(&drawn, clip.span, settings)?;

@@ -26,8 +26,9 @@ const CHUNK: usize = 1 << 14;
 /// "looking".
 ///
 /// # Errors
-/// A Gaussian in the trained form that cannot be drawn, an interruption.
+/// Parts of the capture that do not fit together, a Gaussian in the trained form that cannot be drawn, an interruption.
 pub fn seen_by(scene: &GaussianScene, views: &[TrainingView], progress: &mut dyn Progress) -> Result<Seen, SeenError> {
+    scene.check().map_err(SeenError::Scene)?;
     let gaussians = scene.gaussians()?;
     let cameras = cameras(scene, views);
     progress.begin("looking", gaussians.len().div_ceil(CHUNK));

@@ -9,6 +9,9 @@ use crate::offline::work::Interrupted;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SeenError {
+    /// The parts of the capture do not fit together.
+    #[error("{0}")]
+    Scene(&'static str),
     /// A Gaussian cannot be drawn.
     #[error("{0}")]
     Invalid(#[from] InvalidGaussian),

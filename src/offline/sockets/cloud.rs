@@ -32,7 +32,8 @@ struct Piece {
     gaussian: Gaussian,
     /// Its color, independent of direction and time, 0 to 1.
     color: Vec3,
-    drawn: [f32; 2],
+    /// Timestamp units.
+    drawn: [f64; 2],
 }
 
 impl Cloud {
@@ -45,14 +46,14 @@ impl Cloud {
         scene.check().map_err(SocketError::Scene)?;
         let TrainedWith { time_interval, marginal_cutoff, .. } = scene.trained_with;
         let (gaussians, colors) = (scene.gaussians()?, colors(scene));
-        let reach = lifespan_reach(marginal_cutoff) as f32;
+        let reach = lifespan_reach(marginal_cutoff);
         let piece = |(index, gaussian): (usize, &Gaussian)| {
-            let half = reach * gaussian.sigma_t;
+            let (mean, half) = (f64::from(gaussian.mean_t), reach * f64::from(gaussian.sigma_t));
             let [first, last] = match &scene.filter {
-                Some(filter) => filter.window(index, time_interval).map(|time| time as f32),
-                None => [f32::NEG_INFINITY, f32::INFINITY],
+                Some(filter) => filter.window(index, time_interval),
+                None => [f64::NEG_INFINITY, f64::INFINITY],
             };
-            let drawn = [first.max(gaussian.mean_t - half), last.min(gaussian.mean_t + half)];
+            let drawn = [first.max(mean - half), last.min(mean + half)];
             let color = colors.get(index).filter(|color| color.is_finite())?.clamp(Vec3::ZERO, Vec3::ONE);
             let is_followed = gaussian.opacity > FAINTEST && gaussian.check().is_ok();
             is_followed.then_some(Piece { gaussian: *gaussian, color, drawn })
@@ -117,7 +118,7 @@ impl Piece {
     /// Returns its opacity at a time (timestamp units), 0 to 1; `None` where it is not drawn.
     fn opacity_at(&self, now: f32) -> Option<f32> {
         let Self { gaussian, drawn: [first, last], .. } = self;
-        (*first..=*last).contains(&now).then(|| gaussian.opacity * gaussian.marginal(now))
+        (*first..=*last).contains(&f64::from(now)).then(|| gaussian.opacity * gaussian.marginal(now))
     }
 }
 

@@ -4,7 +4,6 @@
 //! Gaussians that each edit removes; or a [`CaptureEditError`].
 
 use super::capture::GaussianCapture;
-use crate::gaussian::InvalidGaussian;
 use crate::scene::GaussianScene;
 use crate::scene::edit::{EditError, EditList, Edited, apply};
 
@@ -18,6 +17,12 @@ pub enum CaptureEditError {
          edit it before it is drawn"
     )]
     Released,
+    /// The capture is the index of chunk files.
+    #[error("the capture is the index of chunk files, which has no Gaussians: edit it before it is split into files")]
+    Chunks,
+    /// The parts of the capture do not fit together.
+    #[error("the parts of the capture do not fit together: {0}")]
+    Scene(&'static str),
     /// The edits cannot be applied to its scene.
     #[error(transparent)]
     Edit(#[from] EditError),
@@ -31,8 +36,8 @@ impl GaussianCapture {
     /// Every Gaussian is looked at and those that remain are copied: for large captures, call it in a task.
     ///
     /// # Errors
-    /// A capture whose Gaussians are not in [memory](Self::is_released), or whose parts do not fit together; edits that
-    /// leave no Gaussian, an edit that asks what the training cameras see.
+    /// A capture whose Gaussians are not in [memory](Self::is_released) or in chunk files, or whose parts do not fit
+    /// together; edits that leave no Gaussian, an edit that asks what the training cameras see.
     ///
     /// # Examples
     ///
@@ -52,8 +57,11 @@ impl GaussianCapture {
         if self.is_released() {
             return Err(CaptureEditError::Released);
         }
+        if self.scene().chunks.is_some() {
+            return Err(CaptureEditError::Chunks);
+        }
         let scene = GaussianScene::from(self.scene().clone());
-        scene.check().map_err(|reason| EditError::Invalid(InvalidGaussian { index: 0, reason }))?;
+        scene.check().map_err(CaptureEditError::Scene)?;
         let Edited { scene, removed, .. } = apply(scene, list, None)?;
         if removed.iter().all(|count| *count == 0) {
             return Ok((self.clone(), removed));

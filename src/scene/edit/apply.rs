@@ -80,7 +80,8 @@ fn removes(edit: &Edit, index: usize, gaussian: &Gaussian, scene: &GaussianScene
             place(times).is_some_and(|place| is_in_sphere(place, center, radius))
         }
         Edit::RemoveFaintLarge { opacity_below, scale_above } => {
-            gaussian.opacity < opacity_below && largest_deviation(gaussian) > scale_above
+            // Fillers of packed blocks are invisible already.
+            gaussian.opacity > 0.0 && gaussian.opacity < opacity_below && largest_deviation(gaussian) > scale_above
         }
         Edit::RemoveFloaters { cameras_below, distance_below } => {
             seen.is_some_and(|seen| seen.is_floater(index, cameras_below, distance_below))
