@@ -56,6 +56,7 @@ impl PlaybackState {
     /// Compares the playback with its state after the last step: different fields have been set by the game.
     fn notice(&mut self, now: &mut Playback, span: &Span, drive: Drive) -> Progress {
         now.time = span.clamped(now.time);
+        now.returning &= span.repeat().turns_round();
         let following = matches!(drive, Drive::Follow { .. });
         let first = self.span.is_none();
         // A changed range may move the time; this is not a seek.
@@ -110,8 +111,10 @@ impl PlaybackState {
             Some(before) if (Follow { phase: before.phase, ..next }) == before => {
                 if next.phase != before.phase {
                     let travel = self.go(now, span, before.phase, next.phase);
-                    progress.ended = travel.at_end && !self.over;
-                    self.over = travel.at_end;
+                    // A step at the end, also backwards and beyond it, stays there.
+                    let stays = self.over && now.time == self.time;
+                    progress.ended = travel.at_end && !stays;
+                    self.over = travel.at_end || stays;
                     progress.travel = Some(travel);
                 }
             }
@@ -255,6 +258,29 @@ mod tests {
         assert!(!player.follow(4.0, 0).ended, "beyond the end no further end is reported");
         assert!(!player.follow(2.0, 0).ended && player.0.time == 1.0, "the follower plays backwards with the clock");
         assert!(player.follow(3.0, 0).ended, "passing the end again is reported again");
+        assert!(!player.follow(3.4, 0).ended, "beyond the end");
+        assert!(!player.follow(3.3, 0).ended, "backwards beyond the end");
+        assert!(!player.follow(3.5, 0).ended, "and forwards again: the time has stayed at the end");
+        assert!(player.follow(-1.0, 0).ended, "the other end is another one");
+    }
+
+    #[test]
+    fn a_time_sought_in_an_empty_range_is_that_of_followers() {
+        let mut player = Player::new(Playback { start: 1.0, end: 1.0, ..Playback::default() });
+        player.step(Drive::By(0.1));
+        player.0.seek(0.75);
+        player.step(Drive::By(0.1));
+        assert_eq!((player.0.time, player.1.seconds()), (0.75, 0.75), "what is drawn and what is followed");
+    }
+
+    #[test]
+    fn a_playback_that_no_longer_turns_round_does_not_return() {
+        let mut player = Player::new(Playback { repeat: Repeat::PingPong, ..Playback::default() });
+        player.step(Drive::By(2.5));
+        assert!(player.0.returning, "on its way back");
+        player.0.repeat = Repeat::Loop;
+        player.step(Drive::Hold);
+        assert!(!player.0.returning, "a loop has no way back, also while no time passes");
     }
 
     #[test]

@@ -199,8 +199,11 @@ pub(super) fn update_colliders(
         let found = match player {
             None => Err(Lack::Capture),
             Some((capture, handle, playback, picture)) => {
-                let seconds = StreamedPicture::drawn(picture, playback.time);
-                captures.get(&handle.0).map(|loaded| Held::of(capture, *collider, loaded, seconds)).transpose()
+                let held = |loaded: &GaussianCapture| {
+                    let picture = picture.filter(|_| loaded.scene().chunks.is_some());
+                    Held::of(capture, *collider, loaded, StreamedPicture::drawn(picture, playback.time))
+                };
+                captures.get(&handle.0).map(held).transpose()
             }
         };
         let lack = found.as_ref().err().copied();

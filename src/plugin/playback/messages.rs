@@ -4,7 +4,8 @@
 //! event on the entity for observers: `commands.entity(capture).observe(|ended: On<PlaybackEnded>| ..)`.
 //!
 //! The entity is a capture or a [`TimelinePlayer`](super::TimelinePlayer). The events of one entity in one frame are
-//! triggered in this order: seeked, started, paused, segment bounds, markers, looped, ended.
+//! triggered in this order: seeked, started, paused; of each stretch that was played, its segment bounds and then its
+//! markers; looped, ended.
 
 use super::advance::Progress;
 use super::markers::{Marker, crossed};

@@ -23,8 +23,9 @@
 //! mesh of what is solid in it.
 //!
 //! Bevy's own animations may animate any field of a [`Playback`] but `repeat` through
-//! `animated_field!(Playback::speed)`. They run in `PostUpdate`: a `time` set on a capture is drawn in the same frame;
-//! other fields, and all fields of a [`TimelinePlayer`]'s playback, take effect in the next frame.
+//! `animated_field!(Playback::speed)`. They run in `PostUpdate`: a `time` set on a capture is drawn in the same frame,
+//! of a capture in chunk files in the next; other fields, and all fields of a [`TimelinePlayer`]'s playback, take effect
+//! in the next frame.
 
 mod advance;
 mod clock;

@@ -69,6 +69,8 @@ impl PlaybackState {
     /// [`Playback::time`](super::Playback::time).
     pub(crate) fn seconds(&self) -> f64 {
         match self.span {
+            // In an empty range any time can be sought.
+            Some(span) if span.is_still() => self.time.into(),
             // Only a seek leads to the end of a loop: playback wraps there.
             Some(span) if self.is_at_end(&span) => span.end(),
             Some(span) => span.exact(self.phase),

@@ -31,7 +31,8 @@ pub enum PlaybackSystems {
     /// Timelines advance and set up their tracks.
     Timelines,
     /// Captures advance. Systems `.before` this set can change the speed; systems `.after` it read the time that will
-    /// be drawn, and may still change it.
+    /// be drawn, and may still change it, of a capture in chunk files `.before`
+    /// [`CaptureStreamSystems`](crate::stream::CaptureStreamSystems).
     Advance,
     /// Entities with a [`CaptureCollider`](super::CaptureCollider) get the mesh of the time of their capture. Systems
     /// `.after` this set, physics in `PostUpdate`, and in the next frame that in the fixed schedules, have that mesh. A

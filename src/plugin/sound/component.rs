@@ -134,7 +134,7 @@ impl SoundState {
 
     /// Makes the sound silent: there is no player, or no time.
     pub(super) fn rest(&mut self) {
-        (self.speed, self.jumps) = (0.0, None);
+        *self = Self { is_warned: self.is_warned, ..Self::default() };
     }
 }
 

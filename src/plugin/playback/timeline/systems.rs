@@ -144,10 +144,15 @@ pub(in crate::plugin::playback) fn update_tracks(
         let (time, duration) = (clock.seconds, timeline.duration_seconds());
         for &child in children {
             let Ok(((track, mut visibility, mut fade, mut next), parts)) = entities.get_mut(child) else { continue };
-            // A reload may have removed the track.
+            // A reload, or another timeline, may have no such track.
             let track = timeline.track(&track.0);
             next.set_if_neq(track.map(|track| NextClip::of(track, time, playback, duration)).unwrap_or_default());
-            let Some(clip) = track.and_then(|track| track.clip_at(time)) else {
+            let Some(track) = track else {
+                visibility.set_if_neq(Visibility::Hidden);
+                release(parts);
+                continue;
+            };
+            let Some(clip) = track.clip_at(time) else {
                 visibility.set_if_neq(Visibility::Hidden);
                 continue;
             };
@@ -161,6 +166,22 @@ pub(in crate::plugin::playback) fn update_tracks(
 
 /// The components that change with the clip.
 type Parts<'a> = (&'a mut PlayedClip, &'a mut GaussianCapture3d, &'a mut Playback, &'a mut PlaybackState);
+
+/// Releases the capture of the entity of a track that no longer exists.
+fn release(
+    (mut played, mut capture, _, mut state): (
+        Mut<PlayedClip>,
+        Mut<GaussianCapture3d>,
+        Mut<Playback>,
+        Mut<PlaybackState>,
+    ),
+) {
+    capture.set_if_neq(GaussianCapture3d::default());
+    if played.0.is_some() {
+        played.0 = None;
+        *state = state.restarted();
+    }
+}
 
 /// Sets the clip of an entity if the clip has changed. `loaded` is the clip's capture, `None` until it has been loaded.
 fn set_clip(
