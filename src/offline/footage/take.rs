@@ -40,7 +40,7 @@ pub(crate) struct Frame {
 }
 
 impl Take {
-    /// Groups views by camera and moment. Times that differ by at most half of the shortest usual distance between the
+    /// Groups views by camera and moment. Times that differ by at most half of the usual (median) distance between the
     /// frames of a camera are one moment. Pictures are reduced to `longest` pixels on their longer side.
     pub(crate) fn of(views: &[TrainingView], longest: u32) -> Self {
         let mut cameras: Vec<Filmed> = Vec::new();
@@ -86,8 +86,7 @@ pub(crate) fn reduced(camera: &Camera, longest: u32) -> Camera {
     Camera { size, lens, ..*camera }
 }
 
-/// Returns the folder of the images of a camera, or what precedes the number of its only image; `None` if the images
-/// are in several folders.
+/// Returns the folder of the images of a camera; `None` if they are in several folders.
 fn name(frames: &[Frame]) -> Option<String> {
     let folder = |frame: &Frame| frame.view.image.parent().map(Path::to_owned);
     let first = folder(frames.first()?)?;

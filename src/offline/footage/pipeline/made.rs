@@ -8,7 +8,7 @@ use serde_json::Value;
 /// A dataset that has been made of footage.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MadeDataset {
-    /// The names of the cameras, those to train on first.
+    /// The names of the cameras, in the order of their first views.
     pub cameras: Vec<String>,
     /// Number of pictures to train on.
     pub frames: usize,

@@ -60,7 +60,7 @@ pub(super) struct Sample {
     pub moment: usize,
     pub color: RgbImage,
     pub gray: Plane,
-    /// What moves, of the same size: 255, or 0.
+    /// What moves, of the same size: 128 and more.
     pub mask: Option<GrayImage>,
     /// Whether it shows nothing.
     pub blank: bool,
