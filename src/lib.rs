@@ -160,7 +160,7 @@
 //! | [`PlaybackSystems::Timelines`](playback::PlaybackSystems::Timelines) | `Update`, after `Clocks` | advance timelines, set up their tracks |
 //! | [`PlaybackSystems::Advance`](playback::PlaybackSystems::Advance) | `Update`, after `Timelines` | advance captures; send the messages about playing |
 //! | [`CaptureSoundSystems`](sound::CaptureSoundSystems) | `Update`, after `Advance` | update the states of sounds |
-//! | [`CaptureStreamSystems`](stream::CaptureStreamSystems) | `Update`, after `Advance` | load and give up chunk files; send the messages about streaming |
+//! | [`CaptureStreamSystems`](stream::CaptureStreamSystems) | `Update`, after `Advance`, before `Colliders` | load and give up chunk files; send the messages about streaming |
 //! | [`PlaybackSystems::Colliders`](playback::PlaybackSystems::Colliders) | `Update`, after `Advance` | give entities with colliders the mesh of the time; send [`CaptureColliderChanged`](playback::CaptureColliderChanged) |
 //! | [`PlaybackSystems::Sockets`](playback::PlaybackSystems::Sockets) | `PostUpdate`, after Bevy's `AnimationSystems`, before `TransformSystems::Propagate` | move entities with sockets |
 //! | Bevy's `VisibilitySystems::CalculateBounds` | `PostUpdate` | update the `Aabb` of captures |

@@ -212,6 +212,7 @@ mod tests {
     use super::super::geometry::Projector;
     use super::*;
     use glam::{Mat4, UVec2};
+    use image::imageops::FilterType;
     use image::{GrayImage, Luma};
 
     /// Returns a ring of cameras that have seen two balls at two moments.
@@ -265,13 +266,15 @@ mod tests {
         let mut all = ring(5);
         let seen = &mut all.cameras[4];
         let size = seen.camera.size - UVec2::new(0, seen.camera.size.y / 4);
+        // The lens has angles: the same view, with fewer rows.
         seen.camera.size = size;
-        let cut = |mask: &GrayImage| image::imageops::crop_imm(mask, 0, 0, size.x, size.y).to_image();
-        seen.samples.iter_mut().for_each(|sample| sample.mask = sample.mask.as_ref().map(cut));
-        let turned = Mat4::from_rotation_y(25.0_f32.to_radians()) * all.cameras[1].camera.world_to_camera;
-        all.cameras[1].camera.world_to_camera = turned;
-        let found = calibration(&all).expect("one is off by 25 degrees");
-        assert!(!found.cameras.contains(&"cam4".to_owned()), "the one with the smaller pictures is right: {found}");
+        let fewer = |mask: &GrayImage| image::imageops::resize(mask, size.x, size.y, FilterType::Nearest);
+        seen.samples.iter_mut().for_each(|sample| sample.mask = sample.mask.as_ref().map(fewer));
+        let camera = all.cameras[1].camera;
+        all.cameras[1].camera = all.cameras[2].camera;
+        all.cameras[2].camera = camera;
+        let found = calibration(&all).expect("two are exchanged");
+        assert_eq!(found.cameras, ["cam1", "cam2"], "and the one with smaller pictures is left: {found}");
     }
 
     #[test]
