@@ -11,7 +11,6 @@
 #import gs4d::types::{FrameUniforms, BIN_COUNTERS}
 #import gs4d::bins::{bin_grid, bin_side, is_after, FIRST, NONE, SLOT_MASK}
 #import gs4d::nearest::{begin_search, clear_intervals, count_candidate, next_search}
-#import gs4d::tile::tile_index
 
 // Largest number of splats that are sorted at once.
 #ifdef LONG_LISTS
@@ -487,7 +486,8 @@ fn reserve(corner: vec2<u32>, thread: u32) {
 fn write_range(corner: vec2<u32>, number: u32, range: vec2<u32>) {
     let tile = corner + tile_in_bin(number);
     if number < side() * side() && all(tile < frame.tiles) {
-        tile_ranges[tile_index(tile, frame.tiles.x)] = range;
+        // As `tile_index`, whose module has functions that compute with floats.
+        tile_ranges[tile.y * frame.tiles.x + tile.x] = range;
     }
 }
 
