@@ -429,7 +429,8 @@ fn blend_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
         batch_b[BATCH] = vec4(0.0, -1e9, 0.0, 0.0);
         batch_c[BATCH] = vec4(0.0);
     }
-    let range = tile_ranges[tile_index(tile, frame.tiles.x)];
+    // Of the workgroup: what is read from `tile` is not uniform for browsers.
+    let range = tile_ranges[tile_index(group.xy, frame.tiles.x)];
     workgroupBarrier();
     let searching = range.x == NONE.x;
     let end = range.y;
