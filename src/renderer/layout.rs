@@ -97,8 +97,8 @@ pub struct InstanceUniforms {
     pub cropped: u32,
     /// Gaussians per thread of `project_bin`.
     pub per_thread: u32,
-    /// Tile bins: tiles along each side of a bin (8 bits) and the stamp of the frame (16 bits); capacity of each bin in splats, or 0 if bins are counted
-    /// before they are filled; index of this part; number of parts.
+    /// Tile bins: tiles along each side of a bin (8 bits) and the stamp of the frame (16 bits); capacity of each bin in splats, or 0 if
+    /// bins are counted before they are filled; index of this part; number of parts.
     pub binning: [u32; 4],
     /// Screen-space variances of one training pixel squared, at one pixel per camera unit.
     pub trained_variance: [f32; 2],

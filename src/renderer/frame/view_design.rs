@@ -125,7 +125,7 @@ pub(in crate::renderer) trait ViewDesign: Any + Debug + Send + Sync {
     /// Processes the counters of an earlier frame.
     fn note(&mut self, _counters: &Counters, _frame: CountedFrame) {}
 
-    /// Returns the number of entries that the bins of an earlier frame needed, with room for as many splats as in the fullest of them.
+    /// Returns the number of entries that the bins of an earlier frame needed, with room for as many splats in each as the fullest had.
     fn entries_needed(&self) -> u32 {
         0
     }

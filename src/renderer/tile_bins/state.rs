@@ -25,7 +25,7 @@ pub(in crate::renderer) struct BinState {
     pub recorded: bool,
     /// Number of the frame among those of all views.
     pub frame: u32,
-    /// Number of splats of the fullest bin of an earlier frame, and the number of entries that its bins needed with room for as many.
+    /// Number of splats of the fullest bin of an earlier frame, and number of entries that its bins needed, with room for as many in each.
     pub fullest: u32,
     pub needed: u32,
     /// Number of visible splats of an earlier frame, if they have been counted.
