@@ -67,7 +67,7 @@ impl Socket {
     /// A description of the first fault.
     pub fn check(&self) -> Result<(), &'static str> {
         if !Self::is_name(&self.name) {
-            return Err("the name of a socket that is empty, longer than 256 bytes, or has control characters");
+            return Err("the name of a socket that is blank, longer than 256 bytes, or has control characters");
         }
         if self.samples.is_empty() {
             return Err("a socket without samples");
