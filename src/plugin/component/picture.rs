@@ -19,9 +19,9 @@ pub(crate) struct StreamedPicture {
 
 impl StreamedPicture {
     /// Returns the time that is drawn of a capture, seconds since its start: that of its picture, if it is in chunk files and
-    /// has one, else that of its playback.
-    pub(crate) fn drawn(picture: Option<&Self>, playback: f32) -> f32 {
-        picture.and_then(|picture| picture.seconds).unwrap_or(playback)
+    /// has one, else that of its playback. A capture that is not may have the picture of the one before, for a frame.
+    pub(crate) fn drawn(picture: Option<&Self>, is_streamed: bool, playback: f32) -> f32 {
+        picture.filter(|_| is_streamed).and_then(|picture| picture.seconds).unwrap_or(playback)
     }
 }
 
@@ -32,8 +32,13 @@ mod tests {
     #[test]
     fn the_time_of_a_picture_counts_while_playback_waits_for_files() {
         let held = StreamedPicture { seconds: Some(10.0), ..StreamedPicture::default() };
-        assert_eq!(StreamedPicture::drawn(Some(&held), 95.0), 10.0, "the picture is still that of 10 s");
-        assert_eq!(StreamedPicture::drawn(Some(&StreamedPicture::default()), 95.0), 95.0, "no picture yet");
-        assert_eq!(StreamedPicture::drawn(None, 95.0), 95.0, "a whole capture");
+        assert_eq!(StreamedPicture::drawn(Some(&held), true, 95.0), 10.0, "the picture is still that of 10 s");
+        assert_eq!(StreamedPicture::drawn(Some(&StreamedPicture::default()), true, 95.0), 95.0, "no picture yet");
+        assert_eq!(StreamedPicture::drawn(None, false, 95.0), 95.0, "a whole capture");
+        assert_eq!(
+            StreamedPicture::drawn(Some(&held), false, 95.0),
+            95.0,
+            "a whole capture in place of the streamed one"
+        );
     }
 }

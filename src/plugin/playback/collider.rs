@@ -200,8 +200,9 @@ pub(super) fn update_colliders(
             None => Err(Lack::Capture),
             Some((capture, handle, playback, picture)) => {
                 let held = |loaded: &GaussianCapture| {
-                    let picture = picture.filter(|_| loaded.scene().chunks.is_some());
-                    Held::of(capture, *collider, loaded, StreamedPicture::drawn(picture, playback.time))
+                    let is_streamed = loaded.scene().chunks.is_some();
+                    let seconds = StreamedPicture::drawn(picture, is_streamed, playback.time);
+                    Held::of(capture, *collider, loaded, seconds)
                 };
                 captures.get(&handle.0).map(held).transpose()
             }

@@ -94,7 +94,9 @@ pub(super) fn place_sockets(
     for (entity, CaptureSocket(name), parent, mut transform, mut state) in &mut placed {
         let player = parent.and_then(|parent| players.get(parent.parent()).ok());
         let seen = |(handle, playback, picture): (&GaussianCapture3d, &Playback, Option<&StreamedPicture>)| {
-            (captures.get(&handle.0), StreamedPicture::drawn(picture, playback.time))
+            let capture = captures.get(&handle.0);
+            let is_streamed = capture.is_some_and(|capture| capture.scene().chunks.is_some());
+            (capture, StreamedPicture::drawn(picture, is_streamed, playback.time))
         };
         let found = match player.map(seen) {
             None => Err(Lack::Capture),

@@ -103,7 +103,7 @@ pub(crate) fn extract_captures(
             asset: capture.0.id(),
             world_from_capture: transform.affine(),
             center: bounds.map_or(transform.translation(), center),
-            seconds: StreamedPicture::drawn(picture.as_ref(), playback.time),
+            seconds: StreamedPicture::drawn(picture.as_ref(), is_streamed, playback.time),
             is_blank: picture.is_some_and(|picture| picture.seconds.is_none()),
             filtered: settings.filter,
             antialias: settings.antialias,
