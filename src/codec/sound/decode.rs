@@ -1,8 +1,9 @@
 //! Decoding of sound files.
 //!
 //! In: the bytes of a file in Ogg Vorbis or WAV. Out: a [`Sound`] of all its frames, or a [`SoundError`]; memory grows
-//! with what has been decoded, up to a few times [`Sound::MOST_SAMPLES`].
+//! with what has been decoded, up to a few times [`Sound::MOST_SAMPLES`]; the decoder's own is checked before.
 
+use super::codebooks::check_codebooks;
 use super::{Sound, SoundError};
 use crate::codec::CodecError;
 use crate::codec::input::read_at_most;
@@ -38,6 +39,7 @@ fn decode_unchecked(bytes: Arc<[u8]>) -> Result<Sound, SoundError> {
     let track = format.default_track(TrackType::Audio).ok_or_else(|| SoundError::Unknown("no audio track".into()))?;
     let parameters = track.codec_params.as_ref().and_then(|parameters| parameters.audio());
     let parameters = parameters.ok_or_else(|| SoundError::Unknown("no parameters of an audio track".into()))?;
+    check_codebooks(parameters.extra_data.as_deref().unwrap_or_default())?;
     let decoder = get_codecs().make_audio_decoder(parameters, &AudioDecoderOptions::default()).map_err(unknown)?;
     let track = track.id;
     frames(format, decoder, track)

@@ -4,6 +4,8 @@
 //! whose samples can be read at any position, forward and backward.
 
 #[cfg(feature = "sound")]
+mod codebooks;
+#[cfg(feature = "sound")]
 mod decode;
 mod error;
 
