@@ -365,7 +365,8 @@ impl Headless {
         );
         queue.submit([encoder.finish()]);
         let bytes = self.read(&buffer)?;
-        Ok(bytes.chunks_exact(padded as usize).flat_map(|padded| &padded[..row as usize]).copied().collect())
+        let rows: Vec<&[u8]> = bytes.chunks_exact(padded as usize).map(|padded| &padded[..row as usize]).collect();
+        Ok(rows.concat())
     }
 
     /// Copies the first `size` bytes of a buffer to the host, waits for them and returns them.
