@@ -150,7 +150,9 @@ impl FineTune {
         let key = Key::of_files(&[&self.input])?
             .with(Key::of_images(&splits.train, progress)?)
             .with(Key::of_images(&splits.validation, progress)?)
-            .and(&format!("{:?} {:?} {:?}", scene.trained_with, splits.train, splits.validation))
+            .with(Key::of_views(&splits.train))
+            .with(Key::of_views(&splits.validation))
+            .and(&format!("{:?}", scene.trained_with))
             .and(env!("CARGO_PKG_VERSION"));
         let resume = Resume { store: &store, key, every: self.save_every };
         let deferred = interrupt::defer();

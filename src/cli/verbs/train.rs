@@ -226,7 +226,7 @@ impl Train {
         }
         let mut headless = self.renderer.open()?;
         let deferred = interrupt::defer();
-        let trained = training.run(&mut headless, &store, out, progress)?;
+        let trained = training.run(&mut headless, &store, Some(out), progress)?;
         let TrainedCapture { tuned, started, views, splits, compared, interrupted } = &trained;
         let (from, interrupted) = (started.name(), *interrupted);
         let size = self.package.save(&tuned.scene)?;

@@ -71,7 +71,8 @@ impl<'a> Inputs<'a> {
         // How many Gaussians fit into a package of a given size depends on its other parts.
         let sound = scene.sound.as_ref().filter(|_| matches!(settings.goal, Goal::Size(_)));
         let scene_key = sound.map_or(scene_key, |sound| scene_key.with(Key::of(sound.bytes())));
-        let cameras_key = Key::of(format!("{:?} {:?}", splits.train, splits.validation).as_bytes());
+        let cameras = [&splits.train, &splits.validation, &views];
+        let cameras_key = cameras.into_iter().map(|views| Key::of_views(views)).fold(Key::of(b"cameras"), Key::with);
         let trained = Key::of_images(&splits.train, progress)?;
         let image_keys = [trained, Key::of_images(&splits.validation, progress)?];
         let mut subject = Subject::new(checkpoint, scene, settings.background)?;

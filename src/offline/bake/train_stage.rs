@@ -62,11 +62,12 @@ pub fn train_dataset(
     if is_done() {
         progress.note("train: skipped, done before");
     } else {
-        let TrainedCapture { tuned, interrupted, .. } = training.run(headless, &store, &trained, progress)?;
-        save(&trained, &tuned.scene, &write_settings(&tuned.scene.form, None))?;
+        let TrainedCapture { tuned, interrupted, .. } = training.run(headless, &store, None, progress)?;
+        // What has been trained so far is in the store; a package of an earlier bake stays until this one is complete.
         if interrupted {
             return Err(Interrupted.into());
         }
+        save(&trained, &tuned.scene, &write_settings(&tuned.scene.form, None))?;
         store.store(STAGE, key, Key::of_file(&trained)?.bytes())?;
     }
     drop(reserved);

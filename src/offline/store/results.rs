@@ -96,11 +96,12 @@ impl Key {
         Ok(hashes.into_iter().chain(corrected).fold(Self::of(b"images"), Self::with))
     }
 
-    /// Returns the key of the names, cameras and times of these views, which does not depend on the place of their
-    /// folder.
+    /// Returns the key of the names, cameras and times of these views, and of which have masks. It does not depend on the
+    /// place of their folder.
     pub fn of_views(views: &[TrainingView]) -> Self {
         let of = |view: &TrainingView| {
-            Self::of(format!("{} {:?} {} {:?}", view.name, view.camera, view.time, view.original).as_bytes())
+            let TrainingView { name, camera, time, original, mask, .. } = view;
+            Self::of(format!("{name} {camera:?} {time} {original:?} {}", mask.is_some()).as_bytes())
         };
         views.iter().map(of).fold(Self::of(b"views"), Self::with)
     }

@@ -185,7 +185,8 @@ impl<'a> Training<'a> {
             .with(of_cloud)
             .with(Key::of_images(&splits.validation, progress)?)
             .and(&format!("{start:?} {tuning:?} {trained_with:?} {playback:?}"))
-            .and(&format!("{:?} {:?}", splits.train, splits.validation))
+            .with(Key::of_views(&splits.train))
+            .with(Key::of_views(&splits.validation))
             .and(env!("CARGO_PKG_VERSION"));
         Ok(Self { settings, splits, views, trained_with, playback, cloud, key })
     }
@@ -200,7 +201,7 @@ impl<'a> Training<'a> {
         self.key
     }
 
-    /// Trains the capture. Each better scene is written to `out`; the result is not. State is kept in `store`, from
+    /// Trains the capture. Each better scene is written to `live`, if given; the result is not. State is kept in `store`, from
     /// which a training with the same key resumes.
     ///
     /// # Errors
@@ -209,7 +210,7 @@ impl<'a> Training<'a> {
         self,
         headless: &mut Headless,
         store: &Store,
-        out: &Path,
+        live: Option<&Path>,
         progress: &mut dyn Progress,
     ) -> Result<TrainedCapture, TrainError> {
         let capacity = self.settings.capacity();
@@ -233,8 +234,7 @@ impl<'a> Training<'a> {
         let begun = begin(&images, trained_with, playback, start, cloud.as_ref());
         let (scene, started) = begun.map_err(|reason| TrainError::Start { path: data.clone(), reason })?;
         let resume = Resume { store, key, every: *save_every };
-        let (mut tuned, interrupted) = match train(headless, scene, &images, tuning, Some(resume), Some(out), progress)
-        {
+        let (mut tuned, interrupted) = match train(headless, scene, &images, tuning, Some(resume), live, progress) {
             Err(TrainError::Interrupted { tuned: Some(tuned) }) => (*tuned, true),
             tuned => (tuned?, false),
         };

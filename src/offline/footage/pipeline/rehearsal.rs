@@ -77,7 +77,7 @@ impl Rehearsed {
 fn train(settings: &TrainSettings, package: &Path, progress: &mut dyn Progress) -> Result<TrainedCapture, TrainError> {
     let mut headless = GpuSettings::default().open()?;
     let store = Store::beside(package, STATES)?;
-    Training::open(settings, progress)?.run(&mut headless, &store, package, progress)
+    Training::open(settings, progress)?.run(&mut headless, &store, Some(package), progress)
 }
 
 /// Returns the settings of the training.
