@@ -40,8 +40,9 @@ pub(super) fn update_states(
                 reported.clear(*id);
                 changed.insert(*id);
             }
-            AssetEvent::Removed { id } => reported.clear(*id),
-            AssetEvent::Unused { .. } | AssetEvent::LoadedWithDependencies { .. } => {}
+            // A capture that has never loaded is unused, but not removed.
+            AssetEvent::Removed { id } | AssetEvent::Unused { id } => reported.clear(*id),
+            AssetEvent::LoadedWithDependencies { .. } => {}
         }
     }
     let mut failed: HashMap<AssetId<GaussianCapture>, CaptureFailure> = HashMap::new();

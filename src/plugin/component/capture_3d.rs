@@ -6,11 +6,14 @@ use super::capture::GaussianCapture;
 use bevy::asset::{AssetId, Handle};
 use bevy::camera::visibility::{Visibility, VisibilityClass, add_visibility_class};
 use bevy::ecs::component::Component;
+use bevy::ecs::lifecycle::HookContext;
 use bevy::ecs::reflect::ReflectComponent;
 use bevy::ecs::template::FromTemplate;
+use bevy::ecs::world::DeferredWorld;
 use bevy::reflect::Reflect;
 use bevy::reflect::std_traits::ReflectDefault;
 use bevy::transform::components::Transform;
+use std::any::TypeId;
 
 /// Places a capture in the world.
 ///
@@ -61,8 +64,16 @@ use bevy::transform::components::Transform;
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
 #[type_path = "bevy_gs4d"]
 #[require(Transform, Visibility, VisibilityClass)]
-#[component(on_add = add_visibility_class::<GaussianCapture3d>)]
+#[component(on_add = add_visibility_class::<GaussianCapture3d>, on_remove = remove_visibility_class)]
 pub struct GaussianCapture3d(pub Handle<GaussianCapture>);
+
+/// Takes back what the hook of an added component has listed: the class stays on the entity, and an entity that has it
+/// twice is drawn twice.
+fn remove_visibility_class(mut world: DeferredWorld<'_>, context: HookContext) {
+    if let Some(mut classes) = world.get_mut::<VisibilityClass>(context.entity) {
+        classes.retain(|class| *class != TypeId::of::<GaussianCapture3d>());
+    }
+}
 
 impl From<Handle<GaussianCapture>> for GaussianCapture3d {
     fn from(handle: Handle<GaussianCapture>) -> Self {
@@ -73,5 +84,23 @@ impl From<Handle<GaussianCapture>> for GaussianCapture3d {
 impl From<&GaussianCapture3d> for AssetId<GaussianCapture> {
     fn from(capture: &GaussianCapture3d) -> Self {
         capture.0.id()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bevy::ecs::world::World;
+
+    #[test]
+    fn a_capture_that_is_removed_and_inserted_again_is_seen_once() {
+        let mut world = World::new();
+        let entity = world.spawn(GaussianCapture3d::default()).id();
+        let classes = |world: &World| world.get::<VisibilityClass>(entity).map_or(0, |classes| classes.len());
+        assert_eq!(classes(&world), 1, "the classes by which views find a capture");
+        world.entity_mut(entity).remove::<GaussianCapture3d>();
+        assert_eq!(classes(&world), 0, "without its component");
+        world.entity_mut(entity).insert(GaussianCapture3d::default());
+        assert_eq!(classes(&world), 1, "with its component again");
     }
 }

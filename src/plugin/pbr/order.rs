@@ -74,7 +74,7 @@ fn extract_moved_meshes(
     mut moved: ResMut<MovedMeshes>,
     mut follows: Local<bool>,
     captures: Extract<Query<(), With<GaussianCapture3d>>>,
-    meshes: Extract<Query<(Entity, Ref<GlobalTransform>, &Aabb), With<Mesh3d>>>,
+    meshes: Extract<Query<(Entity, Ref<GlobalTransform>, Option<&Aabb>), With<Mesh3d>>>,
 ) {
     moved.0.clear();
     let followed = std::mem::replace(&mut *follows, !captures.is_empty());
@@ -82,7 +82,9 @@ fn extract_moved_meshes(
         return;
     }
     let stale = meshes.iter().filter(|(_, place, _)| !followed || place.is_changed());
-    moved.0.extend(stale.map(|(mesh, place, bounds)| (mesh.into(), place.transform_point(bounds.center.into()))));
+    // A mesh that is never culled has no bounds.
+    let center = |bounds: Option<&Aabb>| bounds.map_or(Vec3::ZERO, |bounds| bounds.center.into());
+    moved.0.extend(stale.map(|(mesh, place, bounds)| (mesh.into(), place.transform_point(center(bounds)))));
 }
 
 fn any_moved(moved: Res<MovedMeshes>) -> bool {

@@ -7,9 +7,11 @@ use bevy::camera::{Camera, Camera3d, RenderTarget};
 use bevy::ecs::component::Component;
 use bevy::ecs::entity::Entity;
 use bevy::ecs::hierarchy::ChildOf;
+use bevy::ecs::lifecycle::HookContext;
 use bevy::ecs::reflect::ReflectComponent;
 use bevy::ecs::system::Commands;
 use bevy::ecs::template::FromTemplate;
+use bevy::ecs::world::DeferredWorld;
 use bevy::reflect::Reflect;
 use bevy::reflect::std_traits::ReflectDefault;
 use bevy::transform::components::Transform;
@@ -95,11 +97,19 @@ impl Eye {
 }
 
 /// Makes an eye draw into its half of the target, the left eye into the left half, and follow the target's size. If the
-/// width is odd, neither eye draws the column in the middle.
+/// width is odd, neither eye draws the column in the middle. Removing it gives the eye its whole target again.
 #[derive(Component, Reflect, Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
 #[type_path = "bevy_gs4d::stereo"]
+#[component(on_remove = reset_viewport)]
 pub struct SideBySide;
+
+/// Takes the half of the target from an eye.
+fn reset_viewport(mut world: DeferredWorld<'_>, context: HookContext) {
+    if let Some(mut camera) = world.get_mut::<Camera>(context.entity) {
+        camera.viewport = None;
+    }
+}
 
 /// The targets that the eyes draw into.
 ///

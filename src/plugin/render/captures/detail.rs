@@ -109,12 +109,12 @@ impl Sight {
     }
 }
 
-/// Copies the resource to the render world.
+/// Copies the resource to the render world; the default if it has been removed.
 pub(in crate::plugin::render) fn extract_detail(
     mut extracted: ResMut<CaptureDetail>,
-    detail: Extract<Res<CaptureDetail>>,
+    detail: Extract<Option<Res<CaptureDetail>>>,
 ) {
-    *extracted = **detail;
+    *extracted = detail.as_deref().copied().unwrap_or_default();
 }
 
 type CameraSize =

@@ -81,9 +81,9 @@ type Placed = (
     Option<&'static StreamedPicture>,
 );
 
-/// Returns whether a resource of the main world has changed, or been added, since the last extraction.
-pub(in crate::plugin::render) fn has_changed<R: Resource>(resource: Extract<Res<R>>) -> bool {
-    resource.is_changed()
+/// Returns whether a resource of the main world has changed or been added since the last extraction, or does not exist.
+pub(in crate::plugin::render) fn has_changed<R: Resource>(resource: Extract<Option<Res<R>>>) -> bool {
+    resource.as_ref().is_none_or(|resource| resource.is_changed())
 }
 
 pub(crate) fn extract_captures(

@@ -343,12 +343,12 @@ fn report(uploads: &Uploads, id: AssetId<GaussianCapture>, name: &str, failure: 
     uploads.fail(id, failure);
 }
 
-/// Copies the budget to the render world.
+/// Copies the budget to the render world; the default if it has been removed.
 pub(in crate::plugin::render) fn extract_upload_budget(
     mut extracted: ResMut<CaptureUploadBudget>,
-    budget: Extract<Res<CaptureUploadBudget>>,
+    budget: Extract<Option<Res<CaptureUploadBudget>>>,
 ) {
-    *extracted = **budget;
+    *extracted = budget.as_deref().copied().unwrap_or_default();
 }
 
 /// Returns whether any capture is being uploaded, or has pages for chunk files, which may go.
