@@ -178,6 +178,19 @@ pub(crate) fn mip_filter_of(filtered: usize, all: usize, parts: &str) -> (bool, 
     (filtered > 0 && filtered == all, is_mixed.then_some(sentence))
 }
 
+/// Raises a degree of color; the new coefficients are 0.
+pub(super) fn raise(harmonics: &mut Harmonics, degree: u32) {
+    if harmonics.degree == degree {
+        return;
+    }
+    let (from, to) = (harmonics.coefficients * 3, (degree as usize + 1).pow(2) * 3);
+    let mut values = vec![0.0; harmonics.values.len() / from * to];
+    for (to, from) in values.chunks_exact_mut(to).zip(harmonics.values.chunks_exact(from)) {
+        to[..from.len()].copy_from_slice(from);
+    }
+    *harmonics = Harmonics { coefficients: to / 3, degree, degree_t: 0, values };
+}
+
 /// Returns the logit of an opacity. 0 and 1 become the nearest values with a finite logit, which are drawn alike.
 pub(crate) fn logit(opacity: f32) -> f32 {
     let opacity = f64::from(opacity).clamp(1e-7, 1.0 - 1e-7);

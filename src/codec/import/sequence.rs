@@ -4,7 +4,7 @@
 //! Gaussians of one frame at a time. Every frame is exact; nothing is interpolated. A frame is shown until the next one
 //! begins: the numbers in their names are times.
 
-use super::columns::{Columns, Played, mip_filter_of};
+use super::columns::{Columns, Played, mip_filter_of, raise};
 use super::error::ImportError;
 use super::imported::Imported;
 use super::ply;
@@ -12,7 +12,7 @@ use crate::codec::hidden::is_hidden;
 use crate::codec::input::read_regular;
 use crate::codec::options::{FPS, InvalidOption, ReadOptions};
 use crate::codec::text::printable;
-use crate::gaussian::{Harmonics, SMALLEST_CUTOFF};
+use crate::gaussian::SMALLEST_CUTOFF;
 use crate::scene::{ActiveSets, FilterKind, MAX_SEGMENTS, TemporalFilter, UpAxis};
 use std::ffi::OsStr;
 use std::io;
@@ -201,19 +201,6 @@ fn append(all: &mut Columns, mut frame: Columns) {
     all.rotation.append(&mut frame.rotation);
     all.opacity_logit.append(&mut frame.opacity_logit);
     all.harmonics.values.append(&mut frame.harmonics.values);
-}
-
-/// Raises a degree of color; the new coefficients are 0.
-fn raise(harmonics: &mut Harmonics, degree: u32) {
-    if harmonics.degree == degree {
-        return;
-    }
-    let (from, to) = (harmonics.coefficients * 3, (degree as usize + 1).pow(2) * 3);
-    let mut values = vec![0.0; harmonics.values.len() / from * to];
-    for (to, from) in values.chunks_exact_mut(to).zip(harmonics.values.chunks_exact(from)) {
-        to[..from.len()].copy_from_slice(from);
-    }
-    *harmonics = Harmonics { coefficients: to / 3, degree, degree_t: 0, values };
 }
 
 /// What frames lose: the sentences of the first frame that loses anything, and the number of such frames.

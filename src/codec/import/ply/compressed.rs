@@ -2,8 +2,9 @@
 //!
 //! In: the tables `chunk`, `vertex` and, for view-dependent color, `sh`. Out: [`Columns`] of Gaussians at rest.
 
+use super::header::Comments;
 use super::origin::{Places, place};
-use super::splats::{degree, rows};
+use super::splats::{degree, is_antialiased, rows};
 use super::table::{Column, Table, row};
 use crate::codec::import::columns::{Columns, coefficient, logit};
 use crate::codec::import::error::ImportError;
@@ -21,6 +22,7 @@ const CHUNK: usize = 256;
 pub(super) fn columns(
     tables: &[Table<'_>],
     vertex: &Table<'_>,
+    comments: &Comments,
     origin: Option<[f64; 3]>,
     lost: &mut Vec<String>,
 ) -> Result<Columns, ImportError> {
@@ -59,6 +61,7 @@ pub(super) fn columns(
         opacity_logit: rows(vertex, |index| logit(bytes(color.u32(index))[3])),
         harmonics: harmonics(tables, chunk, color, count)?,
         origin,
+        mip_filter: is_antialiased(comments),
         ..Columns::default()
     })
 }

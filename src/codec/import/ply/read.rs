@@ -105,7 +105,7 @@ fn at_rest(
 ) -> Result<Columns, ImportError> {
     let vertex = vertex(tables)?;
     match layout {
-        Layout::Compressed => compressed::columns(tables, vertex, origin, lost),
+        Layout::Compressed => compressed::columns(tables, vertex, comments, origin, lost),
         _ => splats::columns(vertex, comments, origin, lost),
     }
 }

@@ -127,11 +127,11 @@ fn fuse(columns: &mut Columns, filter: Column<'_>) {
 }
 
 /// Returns whether the header states training with the screen-space filter of Mip-Splatting; the last comment decides.
-fn is_antialiased(comments: &Comments) -> bool {
+pub(super) fn is_antialiased(comments: &Comments) -> bool {
     let states = |comment: &String| {
-        let one = Comments(vec![comment.clone()]);
-        let mode = one.value("SplatRenderMode").map(|mode| mode.eq_ignore_ascii_case("mip"));
-        mode.or_else(|| one.value("antialiased").map(|flag| flag == "1" || flag.eq_ignore_ascii_case("true")))
+        let one = Comments(vec![comment.to_ascii_lowercase()]);
+        let mode = one.value("splatrendermode").map(|mode| mode == "mip");
+        mode.or_else(|| one.value("antialiased").map(|flag| flag == "1" || flag == "true"))
     };
     comments.0.iter().rev().find_map(states).unwrap_or(false)
 }

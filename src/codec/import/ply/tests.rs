@@ -141,6 +141,11 @@ fn comments_state_the_axis_that_points_up() {
         ("Vertical Axis: z", UpAxis::PosZ),
         ("Vertical axis: y", UpAxis::NegY),
         ("vertical axis: x", UpAxis::PosX),
+        ("Vertical axis: 0 0 1", UpAxis::PosZ),
+        ("Vertical axis: [0.1, -0.98, 0.05]", UpAxis::NegY),
+        ("Vertical axis: -1 0 0.2", UpAxis::NegX),
+        ("Vertical axis: 0 0 0", UpAxis::NegY),
+        ("Vertical axis: 1 NaN 0", UpAxis::NegY),
         ("Vertical axis: sideways", UpAxis::NegY),
         ("gs4d.up +y", UpAxis::PosY),
         ("gs4d.up -x", UpAxis::NegX),
@@ -241,7 +246,7 @@ fn the_filter_of_mip_splatting_is_fused() {
         assert!((found - opacity * factor).abs() < 1e-5, "the opacity of {row} is {opacity} times {factor}");
     }
     for (comments, is_filtered) in
-        [(["antialiased 1", "SplatRenderMode: default"], false), (["x", "SplatRenderMode: mip"], true)]
+        [(["antialiased 1", "SplatRenderMode: default"], false), (["x", "SPLATRENDERMODE: Mip"], true)]
     {
         let file = File { comments: comments.map(str::to_owned).into(), ..File::splats(1, 0) };
         let Imported { scene, lost } = read(&file.little());
@@ -376,6 +381,9 @@ fn compressed_gaussians_lie_in_the_boxes_of_their_chunks() {
     assert_eq!(colors[3..6], [-4.0, -4.0, -4.0], "the first coefficient of each channel");
     assert_eq!(colors[6..9], [4.0, 4.0, 4.0], "the second");
     assert_eq!(colors[9], (128.5 / 256.0 - 0.5) * 8.0, "the third, in the middle of its step");
+    let mut filtered = compressed(2);
+    filtered.splice(4..4, *b"comment SplatRenderMode: mip\n");
+    assert!(read(&filtered).scene.trained_with.mip_filter, "the comment on the filter of Mip-Splatting");
     let other = String::from_utf8_lossy(&compressed(0)).replace("element chunk 1", "element chunk 2");
     assert!(refusal(other.as_bytes()).contains("chunk"), "chunks of another number of Gaussians");
 }

@@ -5,7 +5,7 @@
 use super::files::Files;
 use super::meta;
 use super::sog2::{self, Still, UP};
-use crate::codec::import::columns::{Columns, Played};
+use crate::codec::import::columns::{Columns, Played, mip_filter_of, raise};
 use crate::codec::import::source::Beside;
 use crate::codec::import::{ImportError, Imported};
 use crate::codec::options::ReadOptions;
@@ -73,7 +73,13 @@ pub(super) fn read(beside: &dyn Beside, meta: &Value, options: &ReadOptions) -> 
                 }
                 if let Some(name) = &fields.environment {
                     match still(beside, name, None) {
-                        Ok(around) => append(&mut columns, around.columns),
+                        Ok(around) => {
+                            let filtered = [&columns, &around.columns].iter().filter(|part| part.mip_filter).count();
+                            append(&mut columns, around.columns);
+                            let (mip_filter, mixed) = mip_filter_of(filtered, 2, "parts");
+                            columns.mip_filter = mip_filter;
+                            lost.extend(mixed);
+                        }
                         Err(error) => lost.push(format!("Its surroundings are not shown: {error}.")),
                     }
                 }
@@ -123,19 +129,23 @@ fn level_of(
     beside: &dyn Beside,
     files: &BTreeMap<&str, Vec<Range<usize>>>,
 ) -> Result<(Columns, Vec<String>), ImportError> {
-    let (mut all, mut lost) = (None, Vec::new());
+    let (mut all, mut lost, mut filtered) = (None, Vec::new(), 0);
     for (name, ranges) in files {
         let own = still(beside, name, Some(ranges))?;
         let several = files.len() > 1;
         lost.extend(
             own.lost.into_iter().map(|text| if several { format!("{}: {text}", printable(name)) } else { text }),
         );
+        filtered += usize::from(own.columns.mip_filter);
         match &mut all {
             None => all = Some(own.columns),
             Some(all) => append(all, own.columns),
         }
     }
-    let all = all.ok_or_else(|| ImportError::damaged("its lod-meta.json has no Gaussians"))?;
+    let mut all: Columns = all.ok_or_else(|| ImportError::damaged("its lod-meta.json has no Gaussians"))?;
+    let (mip_filter, mixed) = mip_filter_of(filtered, files.len(), "files");
+    all.mip_filter = mip_filter;
+    lost.extend(mixed);
     Ok((all, lost))
 }
 
@@ -146,11 +156,11 @@ fn still(beside: &dyn Beside, name: &str, ranges: Option<&[Range<usize>]>) -> Re
     sog2::columns(&mut Files::beside(beside, folder), &meta, ranges)
 }
 
-/// Adds Gaussians, with the smaller degree of color of the two.
+/// Adds Gaussians, with the larger degree of color of the two.
 fn append(all: &mut Columns, mut other: Columns) {
-    let degree = all.harmonics.degree.min(other.harmonics.degree);
-    all.harmonics.truncate(degree, 0);
-    other.harmonics.truncate(degree, 0);
+    let degree = all.harmonics.degree.max(other.harmonics.degree);
+    raise(&mut all.harmonics, degree);
+    raise(&mut other.harmonics, degree);
     all.mean.extend(other.mean);
     all.log_scale.extend(other.log_scale);
     all.rotation.extend(other.rotation);
