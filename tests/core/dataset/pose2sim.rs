@@ -68,7 +68,8 @@ impl Data {
 
 /// Returns the table of a camera as Pose2Sim writes it.
 fn table(name: &str, camera: &Looking, coefficients: &str) -> String {
-    let [[fx, fy], [cx, cy], [width, height]] = [FOCAL, CENTER, SIZE.map(f64::from)];
+    // OpenCV counts from the middle of the first pixel.
+    let [[fx, fy], [cx, cy], [width, height]] = [FOCAL, CENTER.map(|side| side - 0.5), SIZE.map(f64::from)];
     format!(
         "[{name}]\nname = \"{name}\"\nsize = [ {width:?}, {height:?},]\n\
          matrix = [ [ {fx:?}, 0.0, {cx:?},], [ 0.0, {fy:?}, {cy:?},], [ 0.0, 0.0, 1.0,],]\n\

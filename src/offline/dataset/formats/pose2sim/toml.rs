@@ -15,6 +15,8 @@ use toml_edit::{Document, Item, TableLike, Value};
 
 /// The entry without which a table is no camera.
 const MATRIX: &str = "matrix";
+/// The middle of the first pixel, for which OpenCV writes 0.
+const MIDDLE: f64 = 0.5;
 
 /// Reads a calibration.
 ///
@@ -51,7 +53,9 @@ fn camera(key: &str, table: &dyn TableLike) -> Result<RigCamera, String> {
             Some(checked_size(width, height).map_err(named)?)
         }
     };
-    let matrix: [f64; 9] = required(table, MATRIX)?;
+    let mut matrix: [f64; 9] = required(table, MATRIX)?;
+    matrix[2] += MIDDLE;
+    matrix[5] += MIDDLE;
     let (rotation, translation) = (required(table, "rotation")?, required(table, "translation")?);
     let coefficients = numbers(table, "distortions")?.unwrap_or_default();
     let fisheye = table.get("fisheye").and_then(Item::as_bool).unwrap_or(false);
