@@ -61,7 +61,7 @@ impl CodedColors {
             (level * (BASE_MAX / levels)).round() as u32
         };
         let records = base.iter().map(|&rgb| lanes::pack_base(rgb.map(place))).collect();
-        (Self { degree, degree_t, records, ..Self::default() }, [low, low + size * (BASE_MAX / 1022.0)])
+        (Self { degree, degree_t, records, ..Self::default() }, [low, low + size])
     }
 
     /// Adds a codebook. A row holds every coefficient but the DC coefficient, RGB innermost: `entries` are rows of
