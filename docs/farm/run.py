@@ -35,7 +35,8 @@ def run(place, names=()):
         try:
             code = subprocess.run(jobs[name], cwd=directory, stdin=subprocess.DEVNULL).returncode
         except OSError as error:
-            refuse(f"{place}, job {name}: {error}")
+            print(f"error: {place}, job {name}: {error}", file=sys.stderr)
+            return 2
         if code:
             print(f"error: {place}: the job {name} has failed", file=sys.stderr)
             return 128 - code if code < 0 else code

@@ -177,7 +177,7 @@ impl Gaussian {
             Err("a mean that is not finite")
         } else if !self.mean_t.is_finite() {
             Err("a temporal mean that is not finite")
-        } else if self.sigma_t.is_nan() || self.sigma_t <= 0.0 {
+        } else if self.sigma_t.is_nan() || self.sigma_t < f32::MIN_POSITIVE {
             Err("a temporal scale that is zero or not a number")
         } else if !finite(&self.velocity) {
             Err("a velocity that is not finite (temporal scale too small)")

@@ -1,4 +1,4 @@
-//! How a signal ends the command: INT, TERM and HUP; on systems without them Ctrl-C.
+//! How a signal ends the command: INT, TERM, and HUP unless it is ignored, as under `nohup`; on systems without them Ctrl-C.
 //!
 //! In: signals. Out: a request that the work end ([`is_requested`]); the end of the process with code 128 + signal: 130
 //! after INT, 143 after TERM. Work that does not end in time, and any work after a second signal, is abandoned:
@@ -8,6 +8,8 @@
 use super::note::note;
 use super::report::Report;
 use crate::offline::work::unfinished;
+#[cfg(unix)]
+use std::fs;
 use std::io;
 use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
 use std::sync::mpsc;
@@ -46,9 +48,18 @@ pub(crate) fn install(as_json: bool) -> io::Result<()> {
 fn listen() -> io::Result<()> {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
     use signal_hook::iterator::Signals;
-    let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP])?;
+    let hup = (!is_ignored(SIGHUP)).then_some(SIGHUP);
+    let mut signals = Signals::new([SIGINT, SIGTERM].into_iter().chain(hup))?;
     thread::Builder::new().name("signals".to_owned()).spawn(move || signals.forever().for_each(on_signal))?;
     Ok(())
+}
+
+/// Returns whether the process has been started with this signal ignored, where the system has the file that says so.
+#[cfg(unix)]
+fn is_ignored(signal: i32) -> bool {
+    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| u64::from_str_radix(line.strip_prefix("SigIgn:")?.trim(), 16).ok());
+    mask.is_some_and(|mask| mask >> (signal - 1) & 1 == 1)
 }
 
 #[cfg(not(unix))]

@@ -68,7 +68,7 @@ pub(crate) struct Compress {
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
     /// Number of views to compare with the original, of --cameras or of an orbit; 0 for none.
-    #[arg(long, value_name = "N", default_value_t = 4)]
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = values::count_or_none(100_000))]
     verify: usize,
     #[command(flatten)]
     views: ViewArgs,

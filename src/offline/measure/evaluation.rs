@@ -63,12 +63,13 @@ pub fn evaluate_scene(
     Ok(Evaluation { background: behind, has_gaps, views: all, mean, contrast: None })
 }
 
-/// Returns the color behind pixels that an image does not cover, RGB, 0 to 1: that of `background`, or that of training
-/// if it has none.
+/// Returns the color behind pixels that an image does not cover, RGB, 0 to 1: that of `background`, black without one,
+/// that of training behind an environment map.
 pub(super) fn color_behind(background: Background, trained_with: &TrainedWith) -> [f32; 3] {
     match background {
         Background::Color(color) => color,
-        Background::None | Background::Environment => trained_with.background,
+        Background::None => [0.0; 3],
+        Background::Environment => trained_with.background,
     }
 }
 

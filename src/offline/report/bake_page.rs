@@ -210,7 +210,7 @@ fn activity(report: &BakeReport) -> String {
         series.push(percent_line(report, "package, let through by the filter", shares));
     }
     let chart = Chart { x: Axis::new("time"), y: Axis { range: Some([0.0, 100.0]), ..Axis::new("active, %") }, series };
-    plotted("Active ratio over time", "Share of the Gaussians whose marginal exceeds 0.05 at that time.", &chart)
+    plotted("Active ratio over time", "Share of the Gaussians whose marginal exceeds the cut-off at that time.", &chart)
 }
 
 fn overlap(report: &BakeReport) -> String {

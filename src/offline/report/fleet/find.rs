@@ -4,18 +4,21 @@
 
 use crate::offline::store::results::{BAKE_FOLDER, WORK_ENDINGS};
 use crate::offline::work::FileError;
+use crate::scene::ChunkTable;
 use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The extension of packages, with its dot.
 const PACKAGE: &str = ".gs4d";
+/// The ending of the folders of chunk files.
+const CHUNKS: &str = ".stream";
 /// The ending of the capture that a bake trains from pictures and keeps beside its package. It is not a result.
 const TRAINED: &str = ".trained.gs4d";
 
 /// Returns the packages that paths name, in their order. A file is a package whether it exists or not. A folder stands
 /// for the packages in it and in its folders, sorted by name, and for the packages that unfinished bakes would write
-/// there; trained captures (`NAME.trained.gs4d`) and hidden files are left out.
+/// there; trained captures (`NAME.trained.gs4d`), chunk files (`NAME.stream/`) and hidden files are left out.
 ///
 /// # Errors
 /// A folder that cannot be read, or has no packages.
@@ -40,6 +43,8 @@ fn in_folder(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
             if name.starts_with('.') {
             } else if !is_folder {
                 found.extend((name.ends_with(PACKAGE) && !name.ends_with(TRAINED)).then_some(path));
+            } else if name.ends_with(CHUNKS) && path.join(ChunkTable::INDEX).exists() {
+                // Chunk files: the package that they are of is listed itself.
             } else if !WORK_ENDINGS.iter().any(|ending| name.ends_with(ending)) {
                 folders.push(path);
             } else if name.ends_with(BAKE_FOLDER) && name.trim_end_matches(BAKE_FOLDER).ends_with(PACKAGE) {
