@@ -93,7 +93,11 @@ export class Opener {
   end() {
     this.own = null;
     this.take()?.end();
-    this.player.close?.();
+    try {
+      this.player.close?.();
+    } catch {
+      // A player that has run out of memory answers no call any more.
+    }
   }
 
   // Returns the stream of the capture that has been opened, if it is in chunk files; from now on it is the caller's.

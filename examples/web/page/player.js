@@ -18,6 +18,8 @@ const DENSEST = 2;
 const SMALL = 320 * 180;
 const SMALLEST_SIDE = 90;
 const FRAME = 1 / 30;
+// Milliseconds between two frames of a page that has not been drawn in the meantime.
+const UNSEEN = 2000;
 const SPEEDS = [0.25, 0.5, 1, 2, 4];
 const BACKGROUNDS = { trained: null, black: [0, 0, 0], gray: [0.5, 0.5, 0.5], white: [1, 1, 1] };
 const WITHOUT =
@@ -40,6 +42,7 @@ let playing = false;
 let wanted = query.get('autoplay') !== '0' && !calm;
 let changed = false;
 let before = 0;
+let density = devicePixelRatio;
 // 'drawn' when the first picture is on its way, true when it is there.
 let pictured = false;
 // Whether the time of the next picture tells about those after it: the first picture of a capture compiles.
@@ -123,7 +126,11 @@ function advance(passed) {
   seconds += passed * speed();
   if (seconds >= duration()) {
     seconds = loops ? seconds % duration() : duration();
-    if (!loops) play(false);
+    if (!loops) {
+      play(false);
+      // What is opened next plays.
+      wanted = true;
+    }
     tell('ended');
   }
   changed = true;
@@ -175,8 +182,11 @@ function flight() {
 // One frame: the time advances whether the device is ready for a picture or not.
 function frame(now) {
   requestAnimationFrame(frame);
+  // Pictures that were finished while the page was not drawn tell nothing.
+  if (drawn && now - before > UNSEEN) drawn.learns = false;
   const passed = Math.min(now - before, 250) / 1000;
   before = now;
+  if (density !== devicePixelRatio) [density, changed] = [devicePixelRatio, true];
   if (!player || !about) return;
   if (orbit.advance(passed, flight())) {
     changed = true;
@@ -214,7 +224,10 @@ function finish(now) {
 }
 
 function draw(moves) {
+  // A frame that is collapsed is drawn once it has a size again.
+  if (!canvas.clientWidth || !canvas.clientHeight) return;
   changed = false;
+  quality.least = Math.min(1, SMALLEST_SIDE / Math.min(...fullSize()));
   try {
     const [first, last] = about.interval;
     const time = duration() ? first + ((last - first) * seconds) / duration() : first;
@@ -497,6 +510,7 @@ function listen() {
   listenKeys();
   for (const event of ['pointermove', 'pointerdown', 'focusin']) addEventListener(event, wake);
   new ResizeObserver(() => (changed = true)).observe(canvas);
+  document.addEventListener('visibilitychange', () => drawn && (drawn.learns = false));
   listenAround(obedient({ play, seek, setSpeed, setBackground, setCamera, openAddress, openBytes }));
   for (const id of ['open', 'full', 'background']) at(id).disabled = false;
   at('background').disabled = !player.set_background;
