@@ -142,6 +142,8 @@ prepare() {
     cargo clippy --version >/dev/null 2>&1 || show rustup component add clippy
   fi
   export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-${XDG_CACHE_HOME:-$HOME/.cache}/bevy_gs4d/target}"
+  # Nobody debugs these builds; panics name their lines without it.
+  export CARGO_PROFILE_DEV_DEBUG=false
   # Incremental builds only save time if one tree is built repeatedly.
   export CARGO_INCREMENTAL=0
   # Cargo would reuse builds of another clone whose files are newer, but their tests read data from that clone.

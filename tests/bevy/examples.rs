@@ -111,6 +111,7 @@ fn headless_writes_pictures() {
 }
 
 #[test]
+#[ignore = "takes minutes; `.ci/full` runs it"]
 fn budget_writes_pictures() {
     draw("budget", &["--size", "160x90", "--copies", "2", "--settle", "4"], 2);
 }

@@ -771,6 +771,7 @@ fn a_whole_stream_has_the_picture_of_the_joined_capture() {
 }
 
 #[test]
+#[ignore = "takes minutes; `.ci/full` runs it"]
 fn a_whole_stream_of_packed_files_has_the_picture_of_the_package() {
     assert!(PACKED.table.files.len() >= 4, "several runs: {:?}", PACKED.table);
     check_pictures(&PACKED);

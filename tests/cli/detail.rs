@@ -135,6 +135,7 @@ fn blacken(folder: &Path) {
 }
 
 #[test]
+#[ignore = "takes minutes; `.ci/full` runs it by name"]
 fn datasets_that_do_not_show_the_capture_are_refused() {
     if !has_gpu() {
         return;
