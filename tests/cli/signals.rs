@@ -1,9 +1,9 @@
 //! How signals end the command: at random moments of work on the GPU, while a pipe without a reader is written, while a
 //! bake writes its outputs.
 //!
-//! In: a small synthetic scene, its own pictures as a dataset, verbs that get INT or TERM. Out: proof that a run ends
-//! with 130, 143 or its own code, without a crash, that no temporary or half-written file is left, and that `--json`
-//! says what exists. Work on the GPU is skipped where there is none.
+//! In: a small synthetic scene, its own pictures as a dataset, verbs that get INT, TERM or HUP. Out: proof that a run
+//! ends with 130, 143, 129 or its own code, without a crash, that no temporary or half-written file is left, and that
+//! `--json` says what exists. Work on the GPU is skipped where there is none.
 //!
 //! `GS4D_SIGNALS` is the number of runs at random moments, over all verbs: 10 unless `.ci/full` sets more. `GS4D_SEED`
 //! is the seed of the moments: several processes can share the runs.
@@ -242,6 +242,31 @@ fn a_pipe_without_a_reader_does_not_delay_the_end() {
             assert_eq!(document["interrupted"], true, "{context}: the document says so: {document}");
             assert_eq!(names(out.path()), ["out.gs4d"], "{context}: only the pipe is left");
         }
+    }
+}
+
+/// Linux says which signals are ignored.
+#[cfg(target_os = "linux")]
+#[test]
+fn the_loss_of_the_terminal_is_ignored_under_nohup() {
+    let inputs = folder();
+    let input = scene(&inputs, "5000");
+    for (shell, ignores) in [("exec \"$0\" \"$@\"", false), ("trap '' HUP; exec \"$0\" \"$@\"", true)] {
+        let out = folder();
+        let pipe = out.path().join("out.gs4d");
+        fifo(&pipe);
+        let mut command = Command::new("sh");
+        command.args(["-c", shell, GS4D]).args(arguments!["convert", &input, &pipe, "--level", "1"]);
+        let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the shell starts");
+        thread::sleep(BLOCKED);
+        send(&child, "HUP");
+        if ignores {
+            thread::sleep(BLOCKED);
+            assert!(child.try_wait().expect("it can be waited for").is_none(), "the command goes on");
+            send(&child, "TERM");
+        }
+        let code = if ignores { 143 } else { 129 };
+        assert_eq!(end_of(&mut child, shell).code(), Some(code), "the code after the signal that ends it: {shell}");
     }
 }
 
