@@ -18,8 +18,6 @@ const DENSEST = 2;
 const SMALL = 320 * 180;
 const SMALLEST_SIDE = 90;
 const FRAME = 1 / 30;
-// Milliseconds between two frames of a page that has not been drawn in the meantime.
-const UNSEEN = 2000;
 const SPEEDS = [0.25, 0.5, 1, 2, 4];
 const BACKGROUNDS = { trained: null, black: [0, 0, 0], gray: [0.5, 0.5, 0.5], white: [1, 1, 1] };
 const WITHOUT =
@@ -182,8 +180,6 @@ function flight() {
 // One frame: the time advances whether the device is ready for a picture or not.
 function frame(now) {
   requestAnimationFrame(frame);
-  // Pictures that were finished while the page was not drawn tell nothing.
-  if (drawn && now - before > UNSEEN) drawn.learns = false;
   const passed = Math.min(now - before, 250) / 1000;
   before = now;
   if (density !== devicePixelRatio) [density, changed] = [devicePixelRatio, true];
@@ -510,6 +506,7 @@ function listen() {
   listenKeys();
   for (const event of ['pointermove', 'pointerdown', 'focusin']) addEventListener(event, wake);
   new ResizeObserver(() => (changed = true)).observe(canvas);
+  // A picture that is finished while nobody sees the page tells nothing about the device.
   document.addEventListener('visibilitychange', () => drawn && (drawn.learns = false));
   listenAround(obedient({ play, seek, setSpeed, setBackground, setCamera, openAddress, openBytes }));
   for (const id of ['open', 'full', 'background']) at(id).disabled = false;
