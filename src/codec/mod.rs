@@ -24,6 +24,7 @@ pub(crate) mod looks;
 pub(crate) mod npy;
 pub(crate) mod options;
 pub mod package;
+pub(crate) mod pickle;
 pub mod sound;
 mod start;
 pub mod stream;
