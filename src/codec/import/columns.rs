@@ -128,6 +128,18 @@ impl Columns {
         }
     }
 
+    /// Appends Gaussians at rest. The lower degree of color is raised to the other.
+    pub(crate) fn append(&mut self, mut other: Self) {
+        let degree = self.harmonics.degree.max(other.harmonics.degree);
+        raise(&mut self.harmonics, degree);
+        raise(&mut other.harmonics, degree);
+        self.mean.append(&mut other.mean);
+        self.log_scale.append(&mut other.log_scale);
+        self.rotation.append(&mut other.rotation);
+        self.opacity_logit.append(&mut other.opacity_logit);
+        self.harmonics.values.append(&mut other.harmonics.values);
+    }
+
     /// Returns the number of Gaussians.
     pub(crate) fn len(&self) -> usize {
         self.mean.len()
@@ -179,7 +191,7 @@ pub(crate) fn mip_filter_of(filtered: usize, all: usize, parts: &str) -> (bool, 
 }
 
 /// Raises a degree of color; the new coefficients are 0.
-pub(super) fn raise(harmonics: &mut Harmonics, degree: u32) {
+fn raise(harmonics: &mut Harmonics, degree: u32) {
     if harmonics.degree == degree {
         return;
     }

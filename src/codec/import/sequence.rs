@@ -4,7 +4,7 @@
 //! Gaussians of one frame at a time. Every frame is exact; nothing is interpolated. A frame is shown until the next one
 //! begins: the numbers in their names are times.
 
-use super::columns::{Columns, Played, mip_filter_of, raise};
+use super::columns::{Columns, Played, mip_filter_of};
 use super::error::ImportError;
 use super::imported::Imported;
 use super::ply;
@@ -79,7 +79,7 @@ pub(crate) fn read<'a>(
         origin = origin.or((columns.len() > 0).then_some(columns.origin));
         up = up.or(own_up);
         filtered += usize::from(columns.mip_filter);
-        append(&mut all, columns);
+        all.append(columns);
     }
     let (mip_filter, mixed) = mip_filter_of(filtered, starts.len(), "frames");
     (all.origin, all.mip_filter) = (origin.unwrap_or_default(), mip_filter);
@@ -189,18 +189,6 @@ fn ordered(names: Vec<String>) -> Result<Vec<String>, ImportError> {
         }
     }
     Ok(frames.into_iter().map(|(_, name)| name).collect())
-}
-
-/// Appends the Gaussians of a frame. The lower degree of color is raised to the other.
-fn append(all: &mut Columns, mut frame: Columns) {
-    let degree = all.harmonics.degree.max(frame.harmonics.degree);
-    raise(&mut all.harmonics, degree);
-    raise(&mut frame.harmonics, degree);
-    all.mean.append(&mut frame.mean);
-    all.log_scale.append(&mut frame.log_scale);
-    all.rotation.append(&mut frame.rotation);
-    all.opacity_logit.append(&mut frame.opacity_logit);
-    all.harmonics.values.append(&mut frame.harmonics.values);
 }
 
 /// What frames lose: the sentences of the first frame that loses anything, and the number of such frames.

@@ -143,18 +143,7 @@ fn joined(mut parts: Vec<Columns>) -> Columns {
     let count = parts.iter().map(Columns::len).sum();
     let degree = parts.iter().map(|part| part.harmonics.degree).max().unwrap_or(0);
     let mut all = Columns::with_capacity(count, degree);
-    let stride = all.harmonics.coefficients * 3;
-    for part in parts {
-        let values = &mut all.harmonics.values;
-        for own in part.harmonics.values.chunks_exact(part.harmonics.coefficients * 3) {
-            values.extend_from_slice(own);
-            values.resize(values.len() + stride - own.len(), 0.0);
-        }
-        all.mean.extend(part.mean);
-        all.log_scale.extend(part.log_scale);
-        all.rotation.extend(part.rotation);
-        all.opacity_logit.extend(part.opacity_logit);
-    }
+    parts.into_iter().for_each(|part| all.append(part));
     all
 }
 

@@ -5,7 +5,7 @@
 use super::files::Files;
 use super::meta;
 use super::sog2::{self, Still, UP};
-use crate::codec::import::columns::{Columns, Played, mip_filter_of, raise};
+use crate::codec::import::columns::{Columns, Played, mip_filter_of};
 use crate::codec::import::source::Beside;
 use crate::codec::import::{ImportError, Imported};
 use crate::codec::options::ReadOptions;
@@ -63,7 +63,7 @@ pub(super) fn read(beside: &dyn Beside, meta: &Value, options: &ReadOptions) -> 
     for level in 0..fields.levels.min(MOST_LEVELS) {
         let files = fields.files_of(level)?;
         match level_of(beside, &files) {
-            Ok((mut columns, mut lost)) => {
+            Ok(Level { mut columns, mut filtered, mut lost }) => {
                 if !missing.is_empty() {
                     lost.push(format!(
                         "This is level {level} of its levels of detail, with {} Gaussians: files of the finer levels are missing ({}).",
@@ -71,18 +71,20 @@ pub(super) fn read(beside: &dyn Beside, meta: &Value, options: &ReadOptions) -> 
                         missing.join("; ")
                     ));
                 }
+                let mut parts = files.len();
                 if let Some(name) = &fields.environment {
                     match still(beside, name, None) {
                         Ok(around) => {
-                            let filtered = [&columns, &around.columns].iter().filter(|part| part.mip_filter).count();
-                            append(&mut columns, around.columns);
-                            let (mip_filter, mixed) = mip_filter_of(filtered, 2, "parts");
-                            columns.mip_filter = mip_filter;
-                            lost.extend(mixed);
+                            parts += 1;
+                            filtered += usize::from(around.columns.mip_filter);
+                            columns.append(around.columns);
                         }
                         Err(error) => lost.push(format!("Its surroundings are not shown: {error}.")),
                     }
                 }
+                let (mip_filter, mixed) = mip_filter_of(filtered, parts, "files");
+                columns.mip_filter = mip_filter;
+                lost.extend(mixed);
                 return Ok(Imported { scene: columns.into_scene(Played::still(UP), options)?, lost });
             }
             Err(ImportError::Io(error)) if error.kind() == io::ErrorKind::NotFound => missing.push(error.to_string()),
@@ -124,11 +126,17 @@ impl Fields {
     }
 }
 
+/// The Gaussians of a level.
+struct Level {
+    columns: Columns,
+    /// The number of files whose Gaussians were trained with the filter of Mip-Splatting.
+    filtered: usize,
+    /// What they lose.
+    lost: Vec<String>,
+}
+
 /// Reads the Gaussians of a level, file by file.
-fn level_of(
-    beside: &dyn Beside,
-    files: &BTreeMap<&str, Vec<Range<usize>>>,
-) -> Result<(Columns, Vec<String>), ImportError> {
+fn level_of(beside: &dyn Beside, files: &BTreeMap<&str, Vec<Range<usize>>>) -> Result<Level, ImportError> {
     let (mut all, mut lost, mut filtered) = (None, Vec::new(), 0);
     for (name, ranges) in files {
         let own = still(beside, name, Some(ranges))?;
@@ -139,14 +147,11 @@ fn level_of(
         filtered += usize::from(own.columns.mip_filter);
         match &mut all {
             None => all = Some(own.columns),
-            Some(all) => append(all, own.columns),
+            Some(all) => all.append(own.columns),
         }
     }
-    let mut all: Columns = all.ok_or_else(|| ImportError::damaged("its lod-meta.json has no Gaussians"))?;
-    let (mip_filter, mixed) = mip_filter_of(filtered, files.len(), "files");
-    all.mip_filter = mip_filter;
-    lost.extend(mixed);
-    Ok((all, lost))
+    let columns: Columns = all.ok_or_else(|| ImportError::damaged("its lod-meta.json has no Gaussians"))?;
+    Ok(Level { columns, filtered, lost })
 }
 
 /// Reads the Gaussians of one `meta.json`.
@@ -154,16 +159,4 @@ fn still(beside: &dyn Beside, name: &str, ranges: Option<&[Range<usize>]>) -> Re
     let meta = meta::parse(&printable(name), &beside.read(name)?)?;
     let folder = name.rsplit_once('/').map_or("", |(folder, _)| folder);
     sog2::columns(&mut Files::beside(beside, folder), &meta, ranges)
-}
-
-/// Adds Gaussians, with the larger degree of color of the two.
-fn append(all: &mut Columns, mut other: Columns) {
-    let degree = all.harmonics.degree.max(other.harmonics.degree);
-    raise(&mut all.harmonics, degree);
-    raise(&mut other.harmonics, degree);
-    all.mean.extend(other.mean);
-    all.log_scale.extend(other.log_scale);
-    all.rotation.extend(other.rotation);
-    all.opacity_logit.extend(other.opacity_logit);
-    all.harmonics.values.extend(other.harmonics.values);
 }
