@@ -7,6 +7,7 @@ use super::BakeError;
 use crate::codec::{self, ReadOptions};
 use crate::offline::compress::{PackedOrder, reorder};
 use crate::offline::segments::{Chunks, Cut, LayerShares, Segment, Split, other_chunks};
+use crate::offline::store::results::CHUNKS;
 use crate::offline::work::{FileError, Progress};
 use crate::scene::{ChunkTable, Form, GaussianScene, PackedScene, SceneForm};
 use std::fs;
@@ -26,7 +27,7 @@ pub fn wants_chunk_files(bytes: u64, seconds: f32) -> bool {
 
 /// Returns the folder of the chunk files of a package: beside it, with the ending `.stream`.
 pub fn chunk_folder(package: &Path) -> PathBuf {
-    package.with_extension("stream")
+    package.with_extension(CHUNKS)
 }
 
 /// Writes the chunk files of a package, whose Gaussians are first brought into their order if they are packed in

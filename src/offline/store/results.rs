@@ -23,6 +23,9 @@ pub(crate) const BAKE_FOLDER: &str = ".bake";
 /// The endings of all folders of intermediate results: those of a bake and of fine-tuning.
 pub(crate) const WORK_ENDINGS: [&str; 2] = [BAKE_FOLDER, ".tune"];
 
+/// The extension of the folder of chunk files that a bake writes beside its package.
+pub(crate) const CHUNKS: &str = "stream";
+
 /// Returns the path of the folder of intermediate results beside an output.
 pub(crate) fn folder_beside(out: &Path, ending: &str) -> PathBuf {
     let mut name = out.file_name().unwrap_or_default().to_owned();

@@ -201,8 +201,8 @@ impl<'a> Training<'a> {
         self.key
     }
 
-    /// Trains the capture. Each better scene is written to `live`, if given; the result is not. State is kept in `store`, from
-    /// which a training with the same key resumes.
+    /// Trains the capture. Each better scene is written to `live`, if given; the result is not. State is kept in
+    /// `store`, from which a training with the same key resumes.
     ///
     /// # Errors
     /// More Gaussians or images than fit, a lost device, a package or a state that cannot be written.

@@ -17,7 +17,19 @@ const COUNTS: [usize; 6] = [0, 4, 5, 8, 12, 14];
 /// Coefficients that can be undone, from the first: k1, k2, p1, p2, k3, k4, k5 and k6.
 const UNDONE: usize = 8;
 
-/// Returns the lens of a camera matrix, whose numbers are row by row.
+/// The middle of the first pixel, for which OpenCV writes 0.
+const MIDDLE: f64 = 0.5;
+
+/// Returns the lens of a camera matrix of OpenCV, row by row, whose center counts from the middle of the first pixel.
+pub(crate) fn own_lens(matrix: &[f64; 9]) -> Result<OriginalLens, FrameProblem> {
+    let mut from_corner = *matrix;
+    // The third column of the first two rows.
+    from_corner[2] += MIDDLE;
+    from_corner[5] += MIDDLE;
+    lens(&from_corner)
+}
+
+/// Returns the lens of a camera matrix, row by row, whose center counts from the corner of the first pixel.
 pub(crate) fn lens(matrix: &[f64; 9]) -> Result<OriginalLens, FrameProblem> {
     let &[fx, skew, cx, below, fy, cy, a, b, c] = matrix;
     if !matrix.iter().all(|value| value.is_finite()) {

@@ -2,7 +2,7 @@
 //!
 //! In: paths of files and folders. Out: the paths of packages, those of unfinished bakes included, each once.
 
-use crate::offline::store::results::{BAKE_FOLDER, WORK_ENDINGS};
+use crate::offline::store::results::{BAKE_FOLDER, CHUNKS, WORK_ENDINGS};
 use crate::offline::work::FileError;
 use crate::scene::ChunkTable;
 use std::collections::HashSet;
@@ -11,8 +11,6 @@ use std::path::{Path, PathBuf};
 
 /// The extension of packages, with its dot.
 const PACKAGE: &str = ".gs4d";
-/// The ending of the folders of chunk files.
-const CHUNKS: &str = ".stream";
 /// The ending of the capture that a bake trains from pictures and keeps beside its package. It is not a result.
 const TRAINED: &str = ".trained.gs4d";
 
@@ -43,7 +41,7 @@ fn in_folder(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
             if name.starts_with('.') {
             } else if !is_folder {
                 found.extend((name.ends_with(PACKAGE) && !name.ends_with(TRAINED)).then_some(path));
-            } else if name.ends_with(CHUNKS) && path.join(ChunkTable::INDEX).exists() {
+            } else if path.extension() == Some(CHUNKS.as_ref()) && path.join(ChunkTable::INDEX).exists() {
                 // Chunk files: the package that they are of is listed itself.
             } else if !WORK_ENDINGS.iter().any(|ending| name.ends_with(ending)) {
                 folders.push(path);

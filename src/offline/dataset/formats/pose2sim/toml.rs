@@ -15,8 +15,6 @@ use toml_edit::{Document, Item, TableLike, Value};
 
 /// The entry without which a table is no camera.
 const MATRIX: &str = "matrix";
-/// The middle of the first pixel, for which OpenCV writes 0.
-const MIDDLE: f64 = 0.5;
 
 /// Reads a calibration.
 ///
@@ -53,9 +51,7 @@ fn camera(key: &str, table: &dyn TableLike) -> Result<RigCamera, String> {
             Some(checked_size(width, height).map_err(named)?)
         }
     };
-    let mut matrix: [f64; 9] = required(table, MATRIX)?;
-    matrix[2] += MIDDLE;
-    matrix[5] += MIDDLE;
+    let matrix: [f64; 9] = required(table, MATRIX)?;
     let (rotation, translation) = (required(table, "rotation")?, required(table, "translation")?);
     let coefficients = numbers(table, "distortions")?.unwrap_or_default();
     let fisheye = table.get("fisheye").and_then(Item::as_bool).unwrap_or(false);
@@ -64,7 +60,7 @@ fn camera(key: &str, table: &dyn TableLike) -> Result<RigCamera, String> {
         name: table.get("name").and_then(Item::as_str).unwrap_or(key).to_owned(),
         size,
         world_to_camera: opencv::pose_of_vector(rotation, translation).map_err(named)?,
-        lens: opencv::lens(&matrix).map_err(named)?,
+        lens: opencv::own_lens(&matrix).map_err(named)?,
         distortion: distortion.map_err(named)?,
     })
 }

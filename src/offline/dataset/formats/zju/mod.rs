@@ -38,8 +38,6 @@ const PARTS: [&str; 3] = ["mask_cihp", "mask", "mask-schp"];
 const METERS: f64 = 100.0;
 /// Millimeters in a meter.
 const MILLIMETERS: f64 = 1000.0;
-/// The middle of the first pixel, for which OpenCV writes 0.
-const MIDDLE: f64 = 0.5;
 /// The largest number of coefficients of distortion.
 const MOST_COEFFICIENTS: usize = 14;
 
@@ -160,15 +158,11 @@ fn cameras(pickle: &Pickle<'_>, count: usize) -> Result<(Vec<Camera>, bool), Str
     let unit = if in_meters { 1.0 } else { MILLIMETERS };
     let camera = |index: usize| -> Result<Camera, String> {
         let failed = |problem: FrameProblem| format!("camera {index}: {problem}");
-        let mut matrix = matrices.of::<9>(index);
-        // The third column of the first two rows.
-        matrix[2] += MIDDLE;
-        matrix[5] += MIDDLE;
         let translation = translations.of::<3>(index).map(|value| value / unit);
         let coefficients = distortions.as_ref().map_or(&[][..], |numbers| numbers.at(index));
         Ok(Camera {
             world_to_camera: opencv::pose_of_rows(&rotations.of::<9>(index), translation).map_err(failed)?,
-            lens: opencv::lens(&matrix).map_err(failed)?,
+            lens: opencv::own_lens(&matrices.of(index)).map_err(failed)?,
             distortion: opencv::distortion(coefficients).map_err(failed)?,
         })
     };
