@@ -40,7 +40,8 @@ let playing = false;
 let wanted = query.get('autoplay') !== '0' && !calm;
 let changed = false;
 let before = 0;
-let density = devicePixelRatio;
+// The density of the screen when the last picture was asked for.
+let drawnDensity = devicePixelRatio;
 // 'drawn' when the first picture is on its way, true when it is there.
 let pictured = false;
 // Whether the time of the next picture tells about those after it: the first picture of a capture compiles.
@@ -182,7 +183,7 @@ function frame(now) {
   requestAnimationFrame(frame);
   const passed = Math.min(now - before, 250) / 1000;
   before = now;
-  if (density !== devicePixelRatio) [density, changed] = [devicePixelRatio, true];
+  if (drawnDensity !== devicePixelRatio) [drawnDensity, changed] = [devicePixelRatio, true];
   if (!player || !about) return;
   if (orbit.advance(passed, flight())) {
     changed = true;
@@ -223,7 +224,7 @@ function draw(moves) {
   // A frame that is collapsed is drawn once it has a size again.
   if (!canvas.clientWidth || !canvas.clientHeight) return;
   changed = false;
-  quality.least = Math.min(1, SMALLEST_SIDE / Math.min(...fullSize()));
+  quality.least = leastShare();
   try {
     const [first, last] = about.interval;
     const time = duration() ? first + ((last - first) * seconds) / duration() : first;
@@ -248,6 +249,9 @@ function fullSize() {
   const density = Math.min(devicePixelRatio, DENSEST) * Math.min(2, Math.max(0.1, Number(query.get('scale')) || 1));
   return [canvas.clientWidth, canvas.clientHeight].map((side) => Math.max(1, side * density));
 }
+
+// The smallest share of the side length, at this size of the canvas.
+const leastShare = () => Math.min(1, SMALLEST_SIDE / Math.min(...fullSize()));
 
 // Sizes the canvas to a share of that. A player without `resize` sizes its canvas itself.
 function fit(share) {
@@ -584,7 +588,7 @@ async function begin() {
     const isSoftware = Boolean(adapter.info?.isFallbackAdapter);
     const [width, height] = fullSize();
     const start = isSoftware ? Math.min(1, Math.sqrt(SMALL / (width * height))) : 1;
-    quality = new Quality(start, SMALLEST_SIDE / Math.min(width, height));
+    quality = new Quality(start, leastShare());
     fit(quality.share(true));
     player = await Player.create(canvas, navigator.gpu.getPreferredCanvasFormat());
     player.resize?.(canvas.width, canvas.height);

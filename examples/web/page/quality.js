@@ -17,7 +17,7 @@ const STEP = 0.3;
 export class Quality {
   // `first` is the share of the side length of the first picture, `least` the smallest one.
   constructor(first = 1, least = 0.1) {
-    this.least = Math.min(1, least);
+    this.least = least;
     this.moving = Math.max(first, this.least);
     this.still = this.moving;
     this.kept = 1;

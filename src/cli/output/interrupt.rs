@@ -1,4 +1,5 @@
-//! How a signal ends the command: INT, TERM, and HUP unless it is ignored, as under `nohup`; on systems without them Ctrl-C.
+//! How a signal ends the command: INT, TERM, and HUP unless it is ignored, as under `nohup`; on systems without them
+//! Ctrl-C.
 //!
 //! In: signals. Out: a request that the work end ([`is_requested`]); the end of the process with code 128 + signal: 130
 //! after INT, 143 after TERM. Work that does not end in time, and any work after a second signal, is abandoned:
