@@ -77,8 +77,9 @@ impl Layout {
 fn no_gaussians(vertex: &Table<'_>) -> ImportError {
     let names: Vec<&str> = vertex.names().take(12).collect();
     let what = if vertex.has("x") { "a point cloud or a mesh" } else { "of an unknown kind" };
+    let properties = if names.is_empty() { "no properties".to_owned() } else { names.join(", ") };
     ImportError::unsupported(format!(
         "is a PLY file, but {what}: its vertices have {}, and no Gaussians (rot_0, scale_0, opacity); train Gaussians from it first",
-        names.join(", ").escape_debug()
+        properties.escape_debug()
     ))
 }

@@ -65,6 +65,8 @@ fn other_files_are_refused_with_the_way_out() {
     assert!(refusal(&full.little()).contains("\"lite\""), "Spacetime Gaussians with a network");
     let text = String::from_utf8(File::splats(1, 0).ascii()).expect("text").replace("element vertex", "element point");
     assert!(refusal(text.as_bytes()).contains("without vertices"), "no vertices");
+    let bare = "ply\nformat ascii 1.0\nelement vertex 0\nend_header\n";
+    assert!(refusal(bare.as_bytes()).contains("its vertices have no properties"), "vertices that say nothing");
     let odd = File::splats(1, 10);
     assert!(refusal(&odd.little()).contains("10 properties f_rest"), "no degree of color");
     let degree_4 = read(&File::splats(1, 72).little());
