@@ -359,6 +359,22 @@ await visit('embedding', 'query=autoplay%3D0', async ({ page, check }) => {
 
 // Waiting --------------------------------------------------------------------------------------------------------------
 
+await visit('collapsed', 'autoplay=0', async ({ page, check, had, until }) => {
+  await until('picture');
+  const size = (style) => page.evaluate((style) => Object.assign(document.getElementById('stage').style, style), style);
+  await size({ height: '0px', minHeight: '0px' });
+  await page.waitForFunction(() => document.getElementById('canvas').clientHeight === 0, null, { timeout: 5000 });
+  await page.evaluate(() => gs4d.seek(1));
+  await page.waitForTimeout(500);
+  check('a picture without a height is no error', (await had('error')).length === 0, await had('error'));
+  check('no message is shown', await page.locator('#message').isHidden());
+  await size({ height: '', minHeight: '' });
+  await page.waitForFunction(() => document.getElementById('canvas').clientHeight > 0, null, { timeout: 5000 });
+  await page.evaluate(() => gs4d.play());
+  await page.waitForFunction(() => gs4d.seconds > 1, null, { timeout: 20000 });
+  check('it plays once it has a height again', (await had('error')).length === 0 && (await page.locator('#message').isHidden()));
+});
+
 await visit('waiting', '', async ({ page, check, had, until }) => {
   await until('picture', 1, 90000);
   const first = (await had('picture'))[0];

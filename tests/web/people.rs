@@ -114,6 +114,11 @@ fn the_page_around_keeps_its_wheel_and_gets_errors_and_times() {
 }
 
 #[test]
+fn a_frame_without_a_height_is_no_error() {
+    check("collapsed", 3);
+}
+
+#[test]
 fn a_slow_device_plays_at_low_resolution_and_rests_at_full_resolution() {
     check("waiting", 7);
     if let Some(found) = found() {
