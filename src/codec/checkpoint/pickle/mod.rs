@@ -21,7 +21,7 @@ use std::collections::HashMap;
 
 /// The values of a pickle.
 #[derive(Debug)]
-pub(in crate::codec::checkpoint) struct Pickle<'a> {
+pub(super) struct Pickle<'a> {
     values: Vec<Value<'a>>,
     root: Id,
     /// Bytes of the pickle.
@@ -35,7 +35,7 @@ impl<'a> Pickle<'a> {
     ///
     /// # Errors
     /// The first opcode, object or argument that is not one of a checkpoint.
-    pub(in crate::codec::checkpoint) fn parse(bytes: &'a [u8]) -> Result<Self, CheckpointError> {
+    pub(super) fn parse(bytes: &'a [u8]) -> Result<Self, CheckpointError> {
         Self::run(bytes, false)
     }
 
@@ -43,7 +43,7 @@ impl<'a> Pickle<'a> {
     ///
     /// # Errors
     /// The first opcode that `torch.save` does not write; a pickle that is cut.
-    pub(in crate::codec::checkpoint) fn parse_inert(bytes: &'a [u8]) -> Result<Self, CheckpointError> {
+    pub(super) fn parse_inert(bytes: &'a [u8]) -> Result<Self, CheckpointError> {
         Self::run(bytes, true)
     }
 
@@ -65,20 +65,17 @@ impl<'a> Pickle<'a> {
     }
 
     /// Returns the number of bytes of the pickle, which others may follow.
-    pub(in crate::codec::checkpoint) fn length(&self) -> usize {
+    pub(super) fn length(&self) -> usize {
         self.length
     }
 
     /// Returns the number of bytes of each value of a storage; `None` if no tensor has it.
-    pub(in crate::codec::checkpoint) fn size_of_storage(&self, key: &str) -> Option<u64> {
+    pub(super) fn size_of_storage(&self, key: &str) -> Option<u64> {
         self.sizes.get(key).copied()
     }
 
     /// Returns the keys that are texts, and the values, of a dictionary; nothing of another value.
-    pub(in crate::codec::checkpoint) fn entries(
-        &self,
-        dictionary: &Value<'a>,
-    ) -> impl DoubleEndedIterator<Item = (&'a str, &Value<'a>)> {
+    pub(super) fn entries(&self, dictionary: &Value<'a>) -> impl DoubleEndedIterator<Item = (&'a str, &Value<'a>)> {
         let ids = if let Value::Dict(ids) = dictionary { &ids[..] } else { &[] };
         ids.as_chunks::<2>().0.iter().filter_map(move |&[key, value]| match self.get(key) {
             &Value::Text(key) => Some((key, self.get(value))),
@@ -87,17 +84,17 @@ impl<'a> Pickle<'a> {
     }
 
     /// Returns the value of a key of a dictionary.
-    pub(in crate::codec::checkpoint) fn entry(&self, dictionary: &Value<'a>, key: &str) -> Option<&Value<'a>> {
+    pub(super) fn entry(&self, dictionary: &Value<'a>, key: &str) -> Option<&Value<'a>> {
         self.entries(dictionary).rfind(|&(found, _)| found == key).map(|(_, value)| value)
     }
 
     /// Returns the outermost value.
-    pub(in crate::codec::checkpoint) fn root(&self) -> &Value<'a> {
+    pub(super) fn root(&self) -> &Value<'a> {
         self.get(self.root)
     }
 
     /// Returns the value that a tuple of this pickle refers to.
-    pub(in crate::codec::checkpoint) fn get(&self, id: Id) -> &Value<'a> {
+    pub(super) fn get(&self, id: Id) -> &Value<'a> {
         &self.values[id as usize]
     }
 }

@@ -9,7 +9,7 @@ use std::fmt;
 
 /// A value of a pickle.
 #[derive(Debug)]
-pub(in crate::codec::checkpoint) enum Value<'a> {
+pub(crate) enum Value<'a> {
     None,
     Bool(bool),
     Int(i64),
@@ -31,7 +31,7 @@ pub(in crate::codec::checkpoint) enum Value<'a> {
 
 /// The name of a Python object: module and name, as in the pickle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::codec::checkpoint) struct Name<'a> {
+pub(crate) struct Name<'a> {
     pub(super) module: &'a [u8],
     pub(super) name: &'a [u8],
 }
@@ -45,7 +45,7 @@ impl fmt::Display for Name<'_> {
 
 impl Value<'_> {
     /// Returns the kind of the value, for messages.
-    pub(in crate::codec::checkpoint) fn kind(&self) -> &'static str {
+    pub(crate) fn kind(&self) -> &'static str {
         match self {
             Self::None => "None",
             Self::Bool(_) => "a bool",
@@ -65,7 +65,7 @@ impl Value<'_> {
 
 /// The Python objects that a checkpoint may name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::codec::checkpoint) enum Global {
+pub(crate) enum Global {
     RebuildParameter,
     RebuildTensor,
     FloatStorage,

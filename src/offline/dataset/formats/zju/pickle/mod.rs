@@ -22,7 +22,7 @@ use value::{Array, Kind, Value};
 
 /// The values of a pickle.
 #[derive(Debug)]
-pub(in crate::offline::dataset::formats::zju) struct Pickle<'a> {
+pub(super) struct Pickle<'a> {
     values: Vec<Value<'a>>,
     root: Id,
 }
@@ -32,7 +32,7 @@ impl<'a> Pickle<'a> {
     ///
     /// # Errors
     /// The first opcode, object or argument that such a file does not have.
-    pub(in crate::offline::dataset::formats::zju) fn parse(bytes: &'a [u8]) -> Result<Self, String> {
+    pub(super) fn parse(bytes: &'a [u8]) -> Result<Self, String> {
         let mut machine = Machine::new(bytes);
         if !matches!(bytes, [op::PROTO, 2..=4, ..]) {
             return Err("its object is no pickle of protocol 2, 3 or 4: save it again with numpy.save".to_owned());
@@ -45,7 +45,7 @@ impl<'a> Pickle<'a> {
     }
 
     /// Returns the outermost value; of an array of one object that object.
-    pub(in crate::offline::dataset::formats::zju) fn root(&self) -> Id {
+    pub(super) fn root(&self) -> Id {
         match self.get(self.root) {
             Value::Array(Some(array)) => match self.get(array.data) {
                 Value::List(items) if items.len() == 1 => items[0],
@@ -56,13 +56,13 @@ impl<'a> Pickle<'a> {
     }
 
     /// Returns the value of a key of a dictionary, the last one if there are several.
-    pub(in crate::offline::dataset::formats::zju) fn entry(&self, dictionary: Id, key: &str) -> Option<Id> {
+    pub(super) fn entry(&self, dictionary: Id, key: &str) -> Option<Id> {
         let Value::Dict(ids) = self.get(dictionary) else { return None };
         ids.as_chunks::<2>().0.iter().rfind(|[found, _]| self.text(*found) == Some(key)).map(|&[_, value]| value)
     }
 
     /// Returns the values of a list or a tuple.
-    pub(in crate::offline::dataset::formats::zju) fn items(&self, list: Id) -> Option<&[Id]> {
+    pub(super) fn items(&self, list: Id) -> Option<&[Id]> {
         match self.get(list) {
             Value::List(items) | Value::Tuple(items) => Some(items),
             _ => None,
@@ -70,7 +70,7 @@ impl<'a> Pickle<'a> {
     }
 
     /// Returns a text.
-    pub(in crate::offline::dataset::formats::zju) fn text(&self, text: Id) -> Option<&'a str> {
+    pub(super) fn text(&self, text: Id) -> Option<&'a str> {
         match *self.get(text) {
             Value::Text(text) => Some(text),
             Value::Bytes(bytes) => std::str::from_utf8(bytes).ok(),
@@ -83,11 +83,7 @@ impl<'a> Pickle<'a> {
     ///
     /// # Errors
     /// More numbers, a value that has none, an array whose bytes are not those of its shape.
-    pub(in crate::offline::dataset::formats::zju) fn numbers(
-        &self,
-        value: Id,
-        most: usize,
-    ) -> Result<Vec<f64>, String> {
+    pub(super) fn numbers(&self, value: Id, most: usize) -> Result<Vec<f64>, String> {
         // Each number may be in a list of its own, and these in others.
         let limit = 4 * most + 16;
         let (mut numbers, mut pending, mut steps) = (Vec::new(), vec![value], 0);
