@@ -2,7 +2,8 @@
 //!
 //! In: the bytes of a file, the buffers beside it. Out: a scene with the Gaussians of all nodes. `container` splits a
 //! file into its JSON and its binary chunk, `document` is the JSON, `buffers` and `accessors` find the numbers, `nodes`
-//! the transformations, `primitive` the Gaussians of a mesh, `color` converts linear colors, `read` puts all together.
+//! the transformations, `primitive` the Gaussians of a mesh, `work` limits how often they are repeated, `color` converts
+//! linear colors, `read` puts all together.
 
 mod accessors;
 mod buffers;
@@ -12,6 +13,7 @@ mod document;
 mod nodes;
 mod primitive;
 mod read;
+mod work;
 
 pub(crate) use container::is_of;
 pub(crate) use read::read;

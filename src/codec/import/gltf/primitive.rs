@@ -4,12 +4,17 @@
 
 use super::accessors::{Accessors, Rows};
 use super::document::{Document, Primitive, Splatting};
+use super::work::Work;
 use crate::codec::import::columns::{Columns, coefficient, logit};
 use crate::codec::import::error::ImportError;
 use crate::codec::import::spz;
+use std::collections::BTreeSet;
 
 /// The prefix of the attributes of the extension.
 const PREFIX: &str = "KHR_gaussian_splatting:";
+
+/// The work of finding the rows of a primitive, in numbers that could be read in its place.
+const PRIMITIVE: usize = 64;
 
 /// The color spaces that are read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,15 +51,17 @@ pub(super) fn checked(splatting: &Splatting) -> Result<ColorSpace, ImportError> 
 /// type with a sign for integers.
 ///
 /// # Errors
-/// Damaged accessors.
+/// Damaged accessors; more of them than the bytes of the file are for.
 pub(super) fn has_log_scales(accessors: &Accessors<'_>) -> Result<bool, ImportError> {
+    let (mut work, mut seen) = (Work::of(accessors.buffers.len()), BTreeSet::new());
     for primitive in splats(accessors.document) {
         let Some(&scale) = primitive.attributes.get(&name("SCALE")) else { continue };
         let is_compressed = primitive.extensions.splatting.as_ref().is_some_and(|own| own.extensions.spz.is_some());
-        if is_compressed {
+        if is_compressed || !seen.insert(scale) {
             continue;
         }
         let rows = accessors.rows(scale, "SCALE")?;
+        work.take(rows.accessor.count.saturating_mul(3))?;
         let mut is_negative = false;
         rows.read(|_, scale: [f32; 3]| is_negative |= scale.iter().any(|&scale| scale < 0.0))?;
         if is_negative || (rows.is_integer() && rows.is_signed()) {
@@ -73,16 +80,23 @@ pub(super) fn splats(document: &Document) -> impl Iterator<Item = &Primitive> {
 /// Returns the Gaussians of a primitive, and what they do not show.
 ///
 /// # Errors
-/// Attributes that are missing, damaged, or of different lengths.
+/// Attributes that are missing, damaged, or of different lengths; more numbers than `work` has left.
 pub(super) fn columns(
     primitive: &Primitive,
     splatting: &Splatting,
     accessors: &Accessors<'_>,
     has_log_scales: bool,
+    work: &mut Work,
 ) -> Result<(Columns, Vec<String>), ImportError> {
+    work.take(PRIMITIVE.saturating_add(primitive.attributes.len()))?;
+    let numbers = |count: usize, coefficients: usize| count.saturating_mul(11 + coefficients * 3);
     if let Some(compressed) = &splatting.extensions.spz {
+        let file = accessors.buffers.view(compressed.buffer_view)?;
+        work.take(file.len())?;
         // Viewers omit the conversion to left, up, front that the draft demands: its axes are those of the mesh.
-        return spz::columns(accessors.buffers.view(compressed.buffer_view)?);
+        let (columns, lost) = spz::columns(file)?;
+        work.take(numbers(columns.len(), columns.harmonics.coefficients))?;
+        return Ok((columns, lost));
     }
     let mut lost = Vec::new();
     let rows = |name: &'static str, own: String| -> Result<Option<Rows<'_>>, ImportError> {
@@ -103,6 +117,7 @@ pub(super) fn columns(
     let degree = degree(primitive);
     let harmonics = degree.map_or(Ok(Vec::new()), |degree| coefficients(primitive, accessors, degree))?;
     harmonics.iter().try_for_each(fits)?;
+    work.take(numbers(count, harmonics.len().max(1)))?;
     let mut columns = Columns::with_capacity(count, degree.unwrap_or(0));
     position.read(|_, mean| columns.mean.push(mean))?;
     let rotation = needed("ROTATION", name("ROTATION"))?;

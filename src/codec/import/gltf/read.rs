@@ -10,6 +10,7 @@ use super::container::Container;
 use super::document::Document;
 use super::nodes::placed;
 use super::primitive::{ColorSpace, checked, columns, has_log_scales, splats};
+use super::work::Work;
 use crate::codec::import::Imported;
 use crate::codec::import::columns::{Columns, Played, mip_filter_of};
 use crate::codec::import::drawable::keep_drawable;
@@ -26,12 +27,6 @@ const KNOWN: [&str; 3] =
 
 /// As `KNOWN`: beginnings of names.
 const HARMLESS: [&str; 3] = ["KHR_materials_", "KHR_texture_", "KHR_lights_"];
-
-/// Numbers that the Gaussians of a small file may take: repeated meshes multiply them.
-const NUMBERS: usize = 16 << 20;
-
-/// Numbers for each byte of a file.
-const NUMBERS_PER_BYTE: usize = 16;
 
 /// Reads a file.
 ///
@@ -71,8 +66,7 @@ fn parts(accessors: &Accessors<'_>, lost: &mut Vec<String>) -> Result<Vec<Column
     let document = accessors.document;
     let has_log_scales = has_log_scales(accessors)?;
     let (placed, moved) = placed(accessors)?;
-    let most = accessors.buffers.len().saturating_mul(NUMBERS_PER_BYTE).max(NUMBERS);
-    let mut numbers = 0_usize;
+    let mut work = Work::of(accessors.buffers.len());
     let mut parts: Vec<Columns> = Vec::new();
     let (mut linear, mut sheared, mut tangential, mut others) = (0, 0, 0, 0);
     for mesh in placed {
@@ -82,6 +76,7 @@ fn parts(accessors: &Accessors<'_>, lost: &mut Vec<String>) -> Result<Vec<Column
         };
         for primitive in &mesh.primitives {
             let Some(splatting) = &primitive.extensions.splatting else {
+                work.take(1)?;
                 others += 1;
                 continue;
             };
@@ -89,12 +84,8 @@ fn parts(accessors: &Accessors<'_>, lost: &mut Vec<String>) -> Result<Vec<Column
                 return Err(ImportError::damaged("a primitive with Gaussians that are not points"));
             }
             let space = checked(splatting)?;
-            let (mut part, part_lost) = columns(primitive, splatting, accessors, has_log_scales)?;
+            let (mut part, part_lost) = columns(primitive, splatting, accessors, has_log_scales, &mut work)?;
             let count = part.len();
-            numbers = numbers.saturating_add(count.saturating_mul(11 + part.harmonics.coefficients * 3));
-            if numbers > most {
-                return Err(ImportError::damaged("it repeats its meshes too often for its size"));
-            }
             lost.extend(part_lost.into_iter().filter(|sentence| !lost.contains(sentence)).collect::<Vec<_>>());
             if space == ColorSpace::Linear {
                 encode(&mut part.harmonics);
@@ -467,6 +458,47 @@ mod tests {
             document["nodes"] = json!(nodes);
         });
         let message = found.expect_err("1.6 million Gaussians of 2").to_string();
+        assert!(message.contains("repeats"), "the message names the fault: {message}");
+    }
+
+    #[test]
+    fn many_accessors_of_the_same_bytes_are_refused() {
+        let (mut document, mut buffer) = document();
+        let rows = 20_000;
+        let view = json!({"buffer": 0, "byteOffset": buffer.len(), "byteLength": rows * 12});
+        document["bufferViews"].as_array_mut().expect("a list").push(view);
+        buffer.resize(buffer.len() + rows * 12, 0);
+        document["buffers"][0]["byteLength"] = json!(buffer.len());
+        let scale = json!({"bufferView": 8, "componentType": 5126, "count": rows, "type": "VEC3"});
+        let read = |different: usize| {
+            let mut document = document.clone();
+            let accessors = document["accessors"].as_array_mut().expect("a list");
+            let first = accessors.len();
+            accessors.extend((0..different).map(|_| scale.clone()));
+            let primitive = |index: usize| {
+                json!({
+                    "attributes": {"KHR_gaussian_splatting:SCALE": first + index % different},
+                    "extensions": {"KHR_gaussian_splatting": {}},
+                })
+            };
+            let hidden: Vec<Value> = (0..400).map(primitive).collect();
+            document["meshes"] = json!([document["meshes"][0], {"primitives": hidden}]);
+            imported(&binary(&document, &buffer), &InMemory::default())
+        };
+        assert!(read(1).is_ok(), "an accessor of many primitives is read once");
+        let message = read(400).expect_err("8 million scales of 20,000").to_string();
+        assert!(message.contains("repeats"), "the message names the fault: {message}");
+    }
+
+    #[test]
+    fn repeated_primitives_without_gaussians_are_counted_too() {
+        let message = refusal(|document| {
+            let primitives = document["meshes"][0]["primitives"].as_array_mut().expect("a list");
+            primitives.resize(6000, json!({}));
+            let nodes = vec![json!({"mesh": 0}); 3000];
+            document["scenes"][0]["nodes"] = (0..nodes.len()).collect();
+            document["nodes"] = json!(nodes);
+        });
         assert!(message.contains("repeats"), "the message names the fault: {message}");
     }
 
