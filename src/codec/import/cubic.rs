@@ -3,6 +3,7 @@
 //! In: columns of Gaussians with velocities and lifespans, and how each path [bends](Bend). Out: [`Imported`], with a
 //! straight piece for each part of a path.
 
+use super::assumed;
 use super::columns::{Columns, Played};
 use super::drawable::keep_drawable_and;
 use super::error::ImportError;
@@ -45,11 +46,7 @@ pub(crate) fn sigma_of_width(width: f32) -> f32 {
 /// assumed one is added to `lost`.
 pub(crate) fn spacetime_clip(options: &ReadOptions, lost: &mut Vec<String>) -> Played {
     let duration_seconds = FRAMES / options.fps.unwrap_or(FPS);
-    if options.duration_seconds.is_none() {
-        lost.push(format!(
-            "The file does not have its duration: {duration_seconds:.2} seconds is assumed ({FRAMES} frames); --duration sets another one."
-        ));
-    }
+    lost.extend(assumed::duration(duration_seconds, options));
     Played { up: UpAxis::NegY, time_interval: [0.0, 1.0], duration_seconds, marginal_cutoff: SMALLEST_CUTOFF }
 }
 

@@ -4,6 +4,7 @@
 //! and what of the file it does not show. Each format is one file here, which fills [`Columns`] and calls
 //! [`Columns::into_scene`]; `super::format` has the table of formats.
 
+mod assumed;
 pub(crate) mod columns;
 mod cubic;
 pub(crate) mod drawable;

@@ -3,6 +3,7 @@
 //! In: the bytes of a zip archive of arrays. Out: [`Imported`]: each track in straight pieces that end at frames. The
 //! unpacked size of the arrays is limited by the [`Budget`] of the archive.
 
+use super::assumed;
 use super::columns::{Columns, Played, coefficient};
 use super::error::ImportError;
 use super::imported::Imported;
@@ -184,6 +185,9 @@ pub(crate) fn read(source: &Source<'_>, options: &ReadOptions) -> Result<Importe
     };
     let angle = pieces.pieces.iter().map(turned).fold(0.0, f32::max).to_degrees();
     let mut lost = statements(&pieces, count, splitting.tolerance);
+    if frames > 1 {
+        lost.extend(assumed::speed(frames, options));
+    }
     lost.push(format!(
         "Rotation and color of a piece are constant: those of its middle frame. The rotation is at most {angle:.1} degrees from that at its \
          beginning."
@@ -258,6 +262,8 @@ mod tests {
             let all = gaussians(&found);
             assert_eq!(all.len(), 3, "one piece and two");
             assert!((found.scene.playback.duration_seconds - 10.0 / 30.0).abs() < 1e-6, "ten steps of 1/30 s");
+            let is_stated = found.lost.iter().any(|sentence| sentence.contains("11 frames are played at 30 a second"));
+            assert!(is_stated, "the speed that is assumed: {:?}", found.lost);
             for frame in 0..FRAMES {
                 let time = frame as f32 / 10.0;
                 let segment = filter.segment_of(time, [0.0, 1.0]);

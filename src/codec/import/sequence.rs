@@ -4,6 +4,7 @@
 //! Gaussians of one frame at a time. Every frame is exact; nothing is interpolated. A frame is shown until the next one
 //! begins: the numbers in their names are times.
 
+use super::assumed;
 use super::columns::{Columns, Played, mip_filter_of};
 use super::error::ImportError;
 use super::imported::Imported;
@@ -88,7 +89,8 @@ pub(crate) fn read<'a>(
     let time_interval = [0.0, duration_seconds];
     let up = up.unwrap_or(UpAxis::NegY);
     let played = Played { up, time_interval, duration_seconds, marginal_cutoff: SMALLEST_CUTOFF };
-    let lost = lost.into_iter().chain(mixed).chain(losses.sentences()).collect();
+    let speed = if count > 1 { assumed::speed(count, options) } else { None };
+    let lost = lost.into_iter().chain(mixed).chain(losses.sentences()).chain(speed).collect();
     Ok(Imported { scene: all.into_scene(played, options)?, lost })
 }
 
@@ -159,10 +161,16 @@ fn number(name: &str) -> Option<(&str, u64)> {
     if is_hidden(OsStr::new(name)) {
         return None;
     }
-    let stem = name.strip_suffix(".ply")?;
-    let stem = stem.strip_suffix(".compressed").unwrap_or(stem);
+    let stem = without_ending(name, ".ply")?;
+    let stem = without_ending(stem, ".compressed").unwrap_or(stem);
     let beginning = stem.trim_end_matches(|c: char| c.is_ascii_digit());
     Some((beginning, stem.strip_prefix(beginning)?.parse().ok()?))
+}
+
+/// Returns a name without its ending, which is of upper or lower case; `None` if it ends otherwise.
+fn without_ending<'n>(name: &'n str, ending: &str) -> Option<&'n str> {
+    let (stem, own) = name.split_at_checked(name.len().checked_sub(ending.len())?)?;
+    own.eq_ignore_ascii_case(ending).then_some(stem)
 }
 
 /// Returns the names of frames, by their numbers; other names are left out.
@@ -243,9 +251,12 @@ mod tests {
         for (name, expected) in [
             ("frame_0009.ply", Some("frame_0010.ply")),
             ("9.compressed.ply", Some("10.compressed.ply")),
+            ("IMG_0009.PLY", Some("IMG_0010.PLY")),
+            ("9.Compressed.Ply", Some("10.Compressed.Ply")),
             ("a1b099.ply", Some("a1b100.ply")),
             ("frame.ply", None),
             ("frame_1.spz", None),
+            ("üü1", None),
         ] {
             assert_eq!(next(name).as_deref(), expected, "after {name}");
         }
@@ -327,7 +338,8 @@ mod tests {
         let filtered = File::splats(1, 0).comment("antialiased 1").little();
         let imported = |second: &[u8]| {
             let files = [("f1.ply", filtered.clone()), ("f2.ply", second.to_owned())];
-            read(frames(&files).into_iter(), &ReadOptions::default()).expect("two frames")
+            let options = ReadOptions { fps: Some(30.0), ..ReadOptions::default() };
+            read(frames(&files).into_iter(), &options).expect("two frames")
         };
         let all = imported(&filtered);
         assert!(all.scene.trained_with.mip_filter && all.lost.is_empty(), "both frames: {:?}", all.lost);
@@ -351,8 +363,9 @@ mod tests {
         let lossy = File::splats(1, 72).little();
         let three = ["a1.ply", "a2.ply", "a3.ply"].map(|name| (name, lossy.clone()));
         let lost = read(frames(&three).into_iter(), &ReadOptions::default()).expect("three frames").lost;
-        assert_eq!(lost.len(), 1, "one sentence for all frames: {lost:?}");
+        assert_eq!(lost.len(), 2, "one sentence for all frames, and one for their speed: {lost:?}");
         assert!(lost[0].starts_with("a1.ply and 2 other frames: "), "that says how many: {lost:?}");
+        assert!(lost[1].contains("3 frames are played at 30 a second"), "the speed that is assumed: {lost:?}");
         let lost =
             read(frames(&[("\u{1b}[2J1.ply", lossy)]).into_iter(), &ReadOptions::default()).expect("a frame").lost;
         assert!(lost[0].starts_with("\\u{1b}[2J1.ply: "), "a name does not control the terminal: {lost:?}");
@@ -365,6 +378,8 @@ mod tests {
         assert_eq!(found.expect("a sequence"), ["f007.ply", "f9.compressed.ply", "f10.ply"], "by number, not by name");
         let found = names(&["._f1.ply", "f1.ply", ".f2.ply", "f2.ply", ".DS_Store", "Thumbs.db"]);
         assert_eq!(found.expect("a sequence"), ["f1.ply", "f2.ply"], "hidden files are no frames");
+        let found = names(&["F2.PLY", "F1.PLY"]);
+        assert_eq!(found.expect("a sequence"), ["F1.PLY", "F2.PLY"], "extensions of either case, as of single files");
         assert!(!is_sequence(&["._f1.ply", "f1.ply"].map(str::to_owned)), "nor do they make a sequence");
         for (files, reason) in [
             (&["f1.ply"][..], "without a sequence"),

@@ -4,6 +4,7 @@
 //! `meta_delta_max_*` before them. Out: [`Imported`]: the path of each Gaussian in straight pieces that end at frames.
 
 use super::table::{Column, Table};
+use crate::codec::import::assumed;
 use crate::codec::import::columns::{Columns, Played};
 use crate::codec::import::drawable::keep_drawable_and;
 use crate::codec::import::error::ImportError;
@@ -227,11 +228,7 @@ fn played(frames: usize, up: UpAxis, options: &ReadOptions, lost: &mut Vec<Strin
         let reason = format!("{frames} frames last {span} seconds");
         return Err(InvalidOption { name: "fps", reason }.into());
     }
-    if options.fps.is_none() && options.duration_seconds.is_none() {
-        lost.push(format!(
-            "The file does not have its speed: its {frames} frames are played at {fps} a second; --fps sets another speed."
-        ));
-    }
+    lost.extend(assumed::speed(frames, options));
     let duration_seconds = if frames > 1 { span } else { 0.0 };
     Ok(Played { time_interval: [0.0, span], duration_seconds, ..Played::still(up) })
 }

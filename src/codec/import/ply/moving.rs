@@ -6,12 +6,16 @@
 use super::header::Comments;
 use super::splats::rows;
 use super::table::{Table, row};
+use crate::codec::import::assumed;
 use crate::codec::import::columns::{Motion, Played};
 use crate::codec::import::error::ImportError;
 use crate::codec::options::{FPS, ReadOptions};
 use crate::gaussian::SMALLEST_CUTOFF;
 use crate::scene::UpAxis;
 use std::f32::consts::FRAC_1_SQRT_2;
+
+/// Seconds of a clip whose file has neither its duration nor its number of frames.
+pub(super) const UNKNOWN: f32 = 1.0;
 
 /// Reads the motion of `FreeTimeGS`: times and velocities are those of a clip from 0 to 1.
 ///
@@ -44,8 +48,12 @@ pub(super) fn free_time(
         ));
     }
     let frames = comments.number("n_frames")?.filter(|&frames| frames >= 1.0);
+    lost.extend(match frames {
+        Some(frames) => assumed::speed(frames, options),
+        None => assumed::duration(UNKNOWN, options),
+    });
     let played = Played {
-        duration_seconds: frames.map_or(1.0, |frames| frames / options.fps.unwrap_or(FPS)),
+        duration_seconds: frames.map_or(UNKNOWN, |frames| frames / options.fps.unwrap_or(FPS)),
         ..moving([0.0, 1.0], SMALLEST_CUTOFF)
     };
     let motion = rows(table, |index| Motion {
@@ -94,7 +102,12 @@ pub(super) fn sogst(
 ///
 /// # Errors
 /// Times of the clip that are no numbers; a property that is missing.
-pub(super) fn sog4d(table: &Table<'_>, comments: &Comments) -> Result<(Vec<Motion>, Played), ImportError> {
+pub(super) fn sog4d(
+    table: &Table<'_>,
+    comments: &Comments,
+    options: &ReadOptions,
+    lost: &mut Vec<String>,
+) -> Result<(Vec<Motion>, Played), ImportError> {
     /// The opacity below which its players draw nothing.
     const CUTOFF: f32 = 0.005;
     let words = || comments.value("cfg_args").unwrap_or("").split_ascii_whitespace();
@@ -108,7 +121,11 @@ pub(super) fn sog4d(table: &Table<'_>, comments: &Comments) -> Result<(Vec<Motio
             })
             .transpose()
     };
-    let (start, duration) = (number("start")?.unwrap_or(0.0), number("duration")?.unwrap_or(1.0));
+    let (start, duration) = (number("start")?.unwrap_or(0.0), number("duration")?);
+    let duration = duration.unwrap_or_else(|| {
+        lost.extend(assumed::duration(UNKNOWN, options));
+        UNKNOWN
+    });
     if duration <= 0.0 || start + duration <= start {
         return Err(ImportError::damaged(format!(
             "its comment cfg_args has the duration {duration}, no positive number"

@@ -7,6 +7,7 @@ use super::header::{Comments, Header};
 use super::layout::Layout;
 use super::table::Table;
 use super::{axes, compressed, deltas, moving, origin, rotated, spacetime, splats, unread};
+use crate::codec::import::assumed;
 use crate::codec::import::columns::{Columns, Played};
 use crate::codec::import::cubic;
 use crate::codec::import::drawable::keep_drawable;
@@ -36,7 +37,7 @@ pub(crate) fn read(source: &Source<'_>, options: &ReadOptions) -> Result<Importe
     let (motion, played) = match layout {
         Layout::FreeTime => moving::free_time(vertex, comments, options, &mut lost)?,
         Layout::Sogst | Layout::SogstCurved => moving::sogst(vertex, comments, options, &mut lost)?,
-        Layout::Sog4d => moving::sog4d(vertex, comments)?,
+        Layout::Sog4d => moving::sog4d(vertex, comments, options, &mut lost)?,
         Layout::Splats | Layout::Compressed | Layout::Rotated => (Vec::new(), Played::still(UpAxis::NegY)),
         Layout::Spacetime => spacetime::lifespans(vertex, options, &mut lost)?,
     };
@@ -119,7 +120,8 @@ fn native(vertex: &Table<'_>, header: &Header, options: &ReadOptions) -> Result<
         trained.parameters.flip_rotations();
     }
     let up = axes::up(&header.comments).unwrap_or(UpAxis::PosZ);
-    let played = Played { duration_seconds: 1.0, marginal_cutoff: MARGINAL_CUTOFF, ..Played::still(up) };
+    lost.extend(assumed::duration(moving::UNKNOWN, options));
+    let played = Played { duration_seconds: moving::UNKNOWN, marginal_cutoff: MARGINAL_CUTOFF, ..Played::still(up) };
     let mut scene = played.scene(SceneForm::Trained(trained), None, options)?;
     scene.trained_with.rotation_convention = convention;
     scene.trained_with.origin.place = origin;

@@ -25,6 +25,12 @@ fn free_time_gaussians_move_and_fade() {
     let faster = ReadOptions { fps: Some(15.0), ..ReadOptions::default() };
     let imported = read_bytes(&free_time().little(), &faster).expect("it can be read");
     assert_eq!(imported.scene.playback.duration_seconds, 4.0, "60 frames at 15 a second");
+    assert_eq!(imported.lost, [""; 0], "nothing is assumed");
+    let assumed = |file: &File| read(&file.little()).lost.join("\n");
+    assert!(assumed(&free_time()).contains("60 frames are played at 30 a second"), "the speed that is assumed");
+    let mut unknown = free_time();
+    unknown.comments.retain(|comment| !comment.starts_with("n_frames"));
+    assert!(assumed(&unknown).contains("1.00 seconds are assumed"), "the duration that is assumed");
     let resting = read(&free_time().comment("use_velocity false").little());
     assert_eq!(sliced(resting).0[2].velocity, [0.0; 3], "velocities are not used");
     assert!(refusal(&free_time().comment("ftgs_version 2").little()).contains("version 2"), "another version");
@@ -43,6 +49,9 @@ fn the_envelope_of_sog4d_is_narrower_by_the_root_of_two() {
     let gaussian = sliced(imported).0[1];
     assert_eq!((gaussian.mean_t, gaussian.velocity), (1.5, [0.0, 1.0, 2.0]), "time and velocity");
     assert!((gaussian.marginal(2.0) - (-(0.5f32 / (-1.0f32).exp()).powi(2)).exp()).abs() < 1e-6, "exp(-(dt/s)^2)");
+    let unknown = read(&file.clone().comment("cfg_args: start=1").little());
+    assert_eq!(unknown.scene.trained_with.time_interval, [1.0, 2.0], "one second");
+    assert!(unknown.lost[0].contains("1.00 seconds are assumed"), "it is stated: {:?}", unknown.lost);
     let bad = file.clone().comment("cfg_args: start=1 duration=-2");
     assert!(refusal(&bad.little()).contains("duration"), "a clip that ends before it begins");
     let curved = (3..9).fold(file, |file, axis| file.with(&format!("motion_{axis}"), |_| 0.0));
@@ -76,6 +85,8 @@ fn gaussians_of_ply4d_are_those_of_the_trainer() {
     let file = File { comments: Vec::new(), names, rows };
     let imported = read(&file.little());
     assert_eq!(imported.scene.trained_with.marginal_cutoff, 0.05, "the cut-off of the trainer");
+    assert_eq!(imported.lost.len(), 1, "{:?}", imported.lost);
+    assert!(imported.lost[0].contains("1.00 seconds are assumed"), "the duration that is assumed: {:?}", imported.lost);
     let (parameters, harmonics) = trained(imported);
     assert_eq!(parameters.model(), Model::Rotated4d, "native 4D Gaussians");
     assert_eq!(parameters.log_scale[0][1], (6.0f32 / 200.0).ln(), "scales are logarithms");
