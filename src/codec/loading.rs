@@ -14,7 +14,7 @@ use super::options::ReadOptions;
 use super::package::{self, PackageError, Reading};
 use super::read_frames;
 use crate::scene::{ChunkTable, Conversion, GaussianScene, RuntimeScene};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::io::{self, Cursor};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -137,7 +137,8 @@ impl Loading {
         Ok(true)
     }
 
-    /// Reads a file, unless its reader asks for another file that was not supplied yet: then the next step begins anew.
+    /// Reads a file, unless its reader asks for other files that were not supplied yet: then the step after all of them
+    /// begins anew.
     fn read_whole(&mut self, mut found: Box<Found<'static>>) -> Result<State, CodecErrorKind> {
         let read = found.read(&self.options);
         self.wanted = self.supplied.take_wanted();
@@ -165,7 +166,10 @@ impl Loading {
             }
             // The sequence ends with the frame before.
             (State::Frames(_), Err(_)) => {}
-            (_, file) => self.supplied.supply(name, file),
+            (_, file) => {
+                self.supplied.supply(name, file);
+                self.wanted = self.supplied.take_wanted();
+            }
         }
     }
 
@@ -245,8 +249,8 @@ struct Supplied(Arc<Mutex<SuppliedFiles>>);
 struct SuppliedFiles {
     /// The bytes of each file, or why there are none.
     known: BTreeMap<String, Result<Vec<u8>, (io::ErrorKind, String)>>,
-    /// The first file that a reader has asked for and that is not known.
-    wanted: Option<String>,
+    /// The files that a reader has asked for and that are not known, in its order.
+    wanted: VecDeque<String>,
 }
 
 impl Supplied {
@@ -254,13 +258,18 @@ impl Supplied {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Stores a file. After one that is missing the reader decides anew which others it needs.
     fn supply(&self, name: String, file: io::Result<Vec<u8>>) {
         let file = file.map_err(|error| (error.kind(), error.to_string()));
-        self.files().known.insert(name, file);
+        let mut files = self.files();
+        if file.is_err() {
+            files.wanted.clear();
+        }
+        files.known.insert(name, file);
     }
 
     fn take_wanted(&self) -> Option<String> {
-        self.files().wanted.take()
+        self.files().wanted.pop_front()
     }
 }
 
@@ -273,8 +282,10 @@ impl Beside for Supplied {
             Some(Ok(bytes)) => return Ok(bytes.clone()),
             Some(Err((kind, reason))) => io::Error::new(*kind, reason.clone()),
             None => {
-                files.wanted.get_or_insert_with(|| name.to_owned());
-                io::Error::new(io::ErrorKind::WouldBlock, "it has not been supplied yet")
+                if files.wanted.is_empty() {
+                    files.wanted.push_back(name.to_owned());
+                }
+                not_supplied()
             }
         };
         Err(named(name, error))
@@ -284,13 +295,41 @@ impl Beside for Supplied {
     fn has(&self, name: &str) -> bool {
         checked(name).is_ok_and(|name| matches!(self.files().known.get(name), Some(Ok(_))))
     }
+
+    /// As its trait says; files that are not known are an error of the kind `WouldBlock`, unless one of the others is
+    /// missing.
+    fn announce(&self, names: &[String]) -> io::Result<()> {
+        let mut files = self.files();
+        let mut unknown = Vec::new();
+        for name in names {
+            match files.known.get(checked(name)?) {
+                Some(Ok(_)) => {}
+                Some(Err((kind, reason))) => return Err(named(name, io::Error::new(*kind, reason.clone()))),
+                None => unknown.push(name),
+            }
+        }
+        let Some(first) = unknown.first() else { return Ok(()) };
+        let error = named(first, not_supplied());
+        let mut asked: BTreeSet<String> = files.wanted.iter().cloned().collect();
+        files.wanted.extend(unknown.into_iter().filter(|name| asked.insert((*name).clone())).cloned());
+        Err(error)
+    }
+}
+
+fn not_supplied() -> io::Error {
+    io::Error::new(io::ErrorKind::WouldBlock, "it has not been supplied yet")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::codec::export::exporter::Exporter;
+    use crate::codec::export::table::Export;
     use crate::scene::synth::{SynthSettings, synthesize};
     use crate::scene::{SceneForm, Trained, UpAxis};
+    use serde_json::{Value, json};
+    use std::io::Read;
+    use zip::ZipArchive;
 
     const BUNDLED: &[u8] = include_bytes!("../../assets/toybox.gs4d");
 
@@ -382,6 +421,80 @@ mod tests {
         assert_eq!(supplied.wanted(), None, "it is supplied");
         let supplied = message(supplied);
         assert!(!supplied.contains("a b.bin"), "the file is there, and has no Gaussians: {supplied}");
+    }
+
+    /// The files of a SOG at one time, by their names.
+    fn sog() -> Vec<(String, Vec<u8>)> {
+        let scene = synthesize(&SynthSettings { count: 200, ..SynthSettings::default() });
+        let exporter = Exporter::new(scene, Export::of_id("sog").expect("a format"), 30.0).expect("it can be exported");
+        let mut bytes = Vec::new();
+        exporter.write(0.5, &mut bytes).expect("memory can be written to");
+        let mut zip = ZipArchive::new(Cursor::new(bytes)).expect("an archive");
+        let count = zip.len();
+        let file = |index| {
+            let mut file = zip.by_index(index).expect("an entry");
+            let mut bytes = Vec::new();
+            file.read_to_end(&mut bytes).expect("intact");
+            (file.name().expect("a name").into_owned(), bytes)
+        };
+        (0..count).map(file).collect()
+    }
+
+    #[test]
+    fn the_parts_of_a_streamed_sog_are_decoded_once_whatever_their_number() {
+        let files = sog();
+        let meta = &files.iter().find(|(name, _)| name == "meta.json").expect("is there").1;
+        let meta: Value = serde_json::from_slice(meta).expect("JSON");
+        let read = |parts: usize| {
+            let part = |part: usize| files.iter().map(move |(name, bytes)| (format!("0_{part}/{name}"), bytes.clone()));
+            let files: BTreeMap<String, Vec<u8>> = (0..=parts).flat_map(part).collect();
+            let names: Vec<String> = (0..parts).map(|part| format!("0_{part}/meta.json")).collect();
+            let chunk = |file: usize| json!({"lods": {"0": {"file": file, "offset": 0, "count": meta["count"]}}});
+            let lod = json!({
+                "lodLevels": 1, "filenames": names, "environment": format!("0_{parts}/meta.json"),
+                "tree": {"children": (0..parts).map(chunk).collect::<Vec<Value>>()},
+            });
+            let bytes = lod.to_string().into_bytes();
+            let mut loading = Loading::new("x/lod-meta.json", bytes, &ReadOptions::default()).expect("a streamed SOG");
+            let (mut steps, mut supplied) = (0, 0);
+            loop {
+                if let Some(name) = loading.wanted() {
+                    let file = files.get(name).cloned();
+                    loading.supply(file.ok_or_else(|| io::Error::from(io::ErrorKind::NotFound)));
+                    supplied += 1;
+                } else if loading.advance(usize::MAX).expect("all files are there") {
+                    steps += 1;
+                } else {
+                    break;
+                }
+            }
+            assert_eq!(supplied, files.len(), "each file is asked for once");
+            (steps, loading.finish().expect("it can be drawn").len())
+        };
+        let (few, many) = (read(1), read(12));
+        assert_eq!(few.1 / 2 * 13, many.1, "all Gaussians, and the surroundings");
+        assert!(few.1 > 0 && few.0 == many.0, "{} steps of 1 file, {} of 12", few.0, many.0);
+    }
+
+    #[test]
+    fn a_file_that_is_missing_ends_the_requests_of_its_level() {
+        let lod = json!({
+            "lodLevels": 2, "filenames": ["0_0/meta.json", "0_1/meta.json", "1_0/meta.json"],
+            "tree": {"children": [
+                {"lods": {"0": {"file": 0, "offset": 0, "count": 9}, "1": {"file": 2, "offset": 0, "count": 1}}},
+                {"lods": {"0": {"file": 1, "offset": 0, "count": 9}, "1": {"file": 2, "offset": 1, "count": 1}}},
+            ]},
+        });
+        let bytes = lod.to_string().into_bytes();
+        let mut loading = Loading::new("lod-meta.json", bytes, &ReadOptions::default()).expect("a streamed SOG");
+        for expected in ["0_0/meta.json", "1_0/meta.json"] {
+            assert!(loading.advance(1).expect("a step that asks"), "there is more to do");
+            assert_eq!(loading.wanted(), Some(expected), "the first file of a level");
+            loading.supply(Err(io::Error::from(io::ErrorKind::NotFound)));
+            assert_eq!(loading.wanted(), None, "no others of this level");
+        }
+        let message = loading.advance(1).expect_err("no level is there").to_string();
+        assert!(message.contains("0_0/meta.json") && message.contains("1_0/meta.json"), "{message}");
     }
 
     #[test]

@@ -27,6 +27,16 @@ pub(crate) trait Beside {
     fn has(&self, name: &str) -> bool {
         self.read(name).is_ok()
     }
+
+    /// Announces files that a reader cannot do without, before it decodes any of them: where files are supplied one by
+    /// one and the reader begins anew, all are asked for at once. Files that can be read at any time need no
+    /// announcement.
+    ///
+    /// # Errors
+    /// A file of which it is known that it is not there or cannot be read; files that have not been supplied yet.
+    fn announce(&self, _names: &[String]) -> io::Result<()> {
+        Ok(())
+    }
 }
 
 /// Files beside a file that is kept while it is read in steps.

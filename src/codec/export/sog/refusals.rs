@@ -4,6 +4,7 @@
 
 use super::archive;
 use super::round_trip::{columns, read, unpacked, written};
+use super::texture;
 use crate::codec::import::source::{InMemory, Source};
 use crate::codec::import::{Imported, sog};
 use crate::codec::options::ReadOptions;
@@ -129,17 +130,7 @@ fn version_1_has_limits_in_place_of_codebooks() {
             meta[name]["codebook"] = json!(book);
         }
     });
-    let first = changed(&bytes, |meta| {
-        let (narrow, wide) = (json!([-0.5, -0.5, -0.5]), json!([0.5, 0.5, 0.5]));
-        let [means, scales, sh0, rest] = ["means", "scales", "sh0", "shN"].map(|name| meta[name].clone());
-        *meta = json!({
-            "means": { "shape": [600, 3], "mins": means["mins"], "maxs": means["maxs"], "files": means["files"] },
-            "scales": { "mins": narrow, "maxs": wide, "files": scales["files"] },
-            "quats": meta["quats"],
-            "sh0": { "mins": [-0.5, -0.5, -0.5, -6.0], "maxs": [0.5, 0.5, 0.5, 6.0], "files": sh0["files"] },
-            "shN": { "mins": -0.5, "maxs": 0.5, "files": rest["files"] },
-        });
-    });
+    let first = changed(&bytes, as_version_1);
     let [(first, first_color), (second, second_color)] =
         [first, second].map(|bytes| at_rest(read(&bytes).expect("intact").scene));
     assert_eq!((first.mean, first.rotation_l), (second.mean, second.rotation_l), "means and rotations are coded alike");
@@ -150,6 +141,36 @@ fn version_1_has_limits_in_place_of_codebooks() {
         let code = 255.0 / (1.0 + (-other).exp());
         assert!((logit - (-6.0 + 12.0 * code / 255.0)).abs() < 1e-3, "opacities are coded as logits");
     }
+}
+
+#[test]
+fn the_least_opacity_of_version_1_is_not_0() {
+    let mut entries = unpacked(&still(600)).1;
+    let codes: Vec<[u8; 4]> = (0..600).map(|index| [9, 8, 7, if index < 5 { 0 } else { 255 }]).collect();
+    let colors = entries.iter_mut().find(|entry| entry.name == "sh0.webp").expect("is there");
+    colors.bytes = texture::encode(&codes).expect("memory");
+    let mut second = Vec::new();
+    archive::write(&entries, &mut second).expect("memory can be written");
+    let first = read(&changed(&second, as_version_1)).expect("intact");
+    assert_eq!(first.lost, [""; 0], "nothing is lost");
+    let (parameters, _) = at_rest(first.scene);
+    assert_eq!(parameters.opacity_logit[4..6], [-6.0, 6.0], "the ends of the limits, of all Gaussians");
+    let second = read(&second).expect("intact");
+    assert_eq!(second.scene.len(), 595, "the code 0 of version 2 is the opacity 0");
+    assert!(second.lost[0].starts_with("5 of 600"), "it is said: {:?}", second.lost);
+}
+
+/// Changes a `meta.json` of version 2 to one of version 1, with limits from -0.5 to 0.5 and opacities from -6 to 6.
+fn as_version_1(meta: &mut Value) {
+    let (narrow, wide) = (json!([-0.5, -0.5, -0.5]), json!([0.5, 0.5, 0.5]));
+    let [means, scales, sh0, rest] = ["means", "scales", "sh0", "shN"].map(|name| meta[name].clone());
+    *meta = json!({
+        "means": { "shape": [600, 3], "mins": means["mins"], "maxs": means["maxs"], "files": means["files"] },
+        "scales": { "mins": narrow, "maxs": wide, "files": scales["files"] },
+        "quats": meta["quats"],
+        "sh0": { "mins": [-0.5, -0.5, -0.5, -6.0], "maxs": [0.5, 0.5, 0.5, 6.0], "files": sh0["files"] },
+        "shN": { "mins": -0.5, "maxs": 0.5, "files": rest["files"] },
+    });
 }
 
 #[test]

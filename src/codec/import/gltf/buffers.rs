@@ -17,6 +17,9 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
     GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
 );
 
+/// The beginning of a URI that has the bytes itself.
+const DATA: &str = "data:";
+
 /// The bytes of all buffers.
 pub(super) struct Buffers<'a> {
     document: &'a Document,
@@ -34,6 +37,9 @@ impl<'a> Buffers<'a> {
         binary: Option<&'a [u8]>,
         beside: &dyn Beside,
     ) -> Result<Self, ImportError> {
+        let files = document.buffers.iter().filter_map(|buffer| buffer.uri.as_deref());
+        let files: Vec<String> = files.filter(|uri| !uri.starts_with(DATA)).map(unescaped).collect();
+        beside.announce(&files)?;
         let mut loaded = BTreeMap::from([(None, Cow::Borrowed(binary.unwrap_or_default()))]);
         for (index, buffer) in document.buffers.iter().enumerate() {
             let uri = buffer.uri.as_deref();
@@ -76,7 +82,7 @@ impl<'a> Buffers<'a> {
 
 /// Returns the bytes of a buffer with a URI.
 fn load(index: usize, uri: &str, beside: &dyn Beside) -> Result<Vec<u8>, ImportError> {
-    let Some(data) = uri.strip_prefix("data:") else {
+    let Some(data) = uri.strip_prefix(DATA) else {
         return Ok(beside.read(&unescaped(uri))?);
     };
     let Some((_, text)) = data.split_once(";base64,") else {

@@ -45,6 +45,16 @@ impl<'a> Files<'a> {
         Self { place: Place::Beside { files, folder } }
     }
 
+    /// Announces files that are read soon, before any of them is decoded.
+    ///
+    /// # Errors
+    /// As [`Beside::announce`].
+    pub(super) fn announce<'n>(&self, names: impl IntoIterator<Item = &'n str>) -> Result<(), ImportError> {
+        let Place::Beside { files, folder } = &self.place else { return Ok(()) };
+        let names: Vec<String> = names.into_iter().map(|name| format!("{folder}{name}")).collect();
+        Ok(files.announce(&names)?)
+    }
+
     /// Returns the bytes of a file.
     ///
     /// # Errors

@@ -59,6 +59,15 @@ struct FirstRest {
     files: [String; 2],
 }
 
+/// What a `meta.json` says of Gaussians at rest.
+pub(super) struct Described {
+    count: u64,
+    layout: Layout,
+    mip_filter: bool,
+    /// Whether Gaussians of the code 0 have the opacity 0. In version 1 they have the least opacity, and a color.
+    has_invisible: bool,
+}
+
 /// Gaussians at rest and what the scene does not show of them.
 pub(super) struct Still {
     pub columns: Columns,
@@ -68,54 +77,76 @@ pub(super) struct Still {
 /// Reads a scene.
 ///
 /// # Errors
-/// As [`columns`]; invalid options.
+/// As [`Described::of`] and [`Described::still`]; invalid options.
 pub(super) fn read(files: &mut Files, meta: &Value, options: &ReadOptions) -> Result<Imported, ImportError> {
-    let Still { columns, lost } = columns(files, meta, None)?;
+    let Still { columns, lost } = Described::of(meta)?.still(files, None)?;
     Ok(Imported { scene: columns.into_scene(Played::still(UP), options)?, lost })
 }
 
-/// Reads the Gaussians of one `meta.json`: those in the ranges given, or all.
-///
-/// # Errors
-/// Another version, a model that is not drawn; a file that is missing or damaged; a range beyond the end.
-pub(super) fn columns(files: &mut Files, meta: &Value, ranges: Option<&[Range<usize>]>) -> Result<Still, ImportError> {
-    let meta::Kind { version, .. } = meta::part("meta.json", meta)?;
-    let (count, layout) = match version {
-        None => first(meta)?,
-        Some(2) => {
-            let images: Images = meta::part("meta.json", meta)?;
-            (images.count, Layout::of_images(images)?)
-        }
-        Some(version) => {
-            return Err(ImportError::unsupported(format!(
-                "a SOG of version {version}, and only versions 1 and 2 are known; convert it to PLY with the current splat-transform"
-            )));
-        }
-    };
-    let Drawn { model } = meta::part("meta.json", meta)?;
-    let mip_filter = match model.as_deref() {
-        None => false,
-        Some("antialiased") => true,
-        Some(model) => {
-            let model = printable(model);
-            return Err(ImportError::unsupported(format!(
-                "a SOG of the model \"{model}\", whose splats are not 3D Gaussians"
-            )));
-        }
-    };
-    let centroids = layout.centroids(files)?;
-    let encoded = textures::read(files, layout.names())?;
-    let count = textures::check_count(count, &encoded)?;
-    let textures = textures::decode(&encoded, count)?;
-    let whole = 0..count;
-    let ranges = ranges.unwrap_or(std::slice::from_ref(&whole));
-    let wanted: usize = ranges.iter().map(Range::len).sum();
-    if wanted > count || ranges.iter().any(|range| range.end > count) {
-        return Err(ImportError::damaged(format!("it has {count} Gaussians, fewer than lod-meta.json states")));
+impl Described {
+    /// Returns what a `meta.json` says.
+    ///
+    /// # Errors
+    /// Another version, a model that is not drawn; a field that is missing or wrong.
+    pub(super) fn of(meta: &Value) -> Result<Self, ImportError> {
+        let meta::Kind { version, .. } = meta::part("meta.json", meta)?;
+        let (count, layout) = match version {
+            None => first(meta)?,
+            Some(2) => {
+                let images: Images = meta::part("meta.json", meta)?;
+                (images.count, Layout::of_images(images)?)
+            }
+            Some(version) => {
+                return Err(ImportError::unsupported(format!(
+                    "a SOG of version {version}, and only versions 1 and 2 are known; convert it to PLY with the current splat-transform"
+                )));
+            }
+        };
+        let Drawn { model } = meta::part("meta.json", meta)?;
+        let mip_filter = match model.as_deref() {
+            None => false,
+            Some("antialiased") => true,
+            Some(model) => {
+                let model = printable(model);
+                return Err(ImportError::unsupported(format!(
+                    "a SOG of the model \"{model}\", whose splats are not 3D Gaussians"
+                )));
+            }
+        };
+        Ok(Self { count, layout, mip_filter, has_invisible: version.is_some() })
     }
-    let kept: Vec<u32> = ranges.iter().flat_map(|range| splats::visible(&textures, range.clone())).collect();
-    let lost = invisible(wanted - kept.len(), wanted).into_iter().collect();
-    Ok(Still { columns: Columns { mip_filter, ..layout.columns(&textures, &centroids, &kept)? }, lost })
+
+    /// Returns the names of all its textures.
+    pub(super) fn textures(&self) -> impl Iterator<Item = &str> {
+        let centroids = self.layout.rest.as_ref().map(|rest| rest.centroids.as_str());
+        self.layout.names().chain(centroids)
+    }
+
+    /// Reads its Gaussians: those in the ranges given, or all.
+    ///
+    /// # Errors
+    /// A file that is missing or damaged; a range beyond the end.
+    pub(super) fn still(&self, files: &mut Files, ranges: Option<&[Range<usize>]>) -> Result<Still, ImportError> {
+        let Self { count, layout, mip_filter, has_invisible } = self;
+        let centroids = layout.centroids(files)?;
+        let encoded = textures::read(files, layout.names())?;
+        let count = textures::check_count(*count, &encoded)?;
+        let textures = textures::decode(&encoded, count)?;
+        let whole = 0..count;
+        let ranges = ranges.unwrap_or(std::slice::from_ref(&whole));
+        let wanted: usize = ranges.iter().map(Range::len).sum();
+        if wanted > count || ranges.iter().any(|range| range.end > count) {
+            return Err(ImportError::damaged(format!("it has {count} Gaussians, fewer than lod-meta.json states")));
+        }
+        let kept: Vec<u32> = if *has_invisible {
+            ranges.iter().flat_map(|range| splats::visible(&textures, range.clone())).collect()
+        } else {
+            ranges.iter().flat_map(|range| range.start as u32..range.end as u32).collect()
+        };
+        let lost = invisible(wanted - kept.len(), wanted).into_iter().collect();
+        let columns = layout.columns(&textures, &centroids, &kept)?;
+        Ok(Still { columns: Columns { mip_filter: *mip_filter, ..columns }, lost })
+    }
 }
 
 /// Returns the sentence about Gaussians of opacity 0, if there are any.

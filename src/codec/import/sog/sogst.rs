@@ -197,13 +197,13 @@ fn groups(
 impl Reading {
     /// Reads the Gaussians of all groups, in their order.
     fn all(&self, files: &mut Files, count: u64, groups: &[(String, u64)]) -> Result<Group, ImportError> {
-        let encoded: Result<Vec<Vec<Encoded>>, ImportError> = groups
-            .iter()
-            .map(|(folder, _)| {
-                let names: Vec<String> = self.names().map(|name| format!("{folder}{name}")).collect();
-                textures::read(files, names.iter().map(String::as_str))
-            })
-            .collect();
+        let of_group = |(folder, _): &(String, u64)| -> Vec<String> {
+            self.names().map(|name| format!("{folder}{name}")).collect()
+        };
+        let names: Vec<Vec<String>> = groups.iter().map(of_group).collect();
+        files.announce(names.iter().flatten().map(String::as_str))?;
+        let encoded: Result<Vec<Vec<Encoded>>, ImportError> =
+            names.iter().map(|names| textures::read(files, names.iter().map(String::as_str))).collect();
         let encoded = encoded?;
         textures::check_count(count, encoded.iter().flatten())?;
         let decoded: Vec<_> =

@@ -1,7 +1,7 @@
 //! The attributes that all formats of the SOG family have, from textures to columns.
 //!
-//! In: the names of the textures and the meaning of their codes, the textures. Out: [`Columns`] of Gaussians at rest;
-//! those whose opacity is 0 are left out, since writers do not keep their colors.
+//! In: the names of the textures and the meaning of their codes, the textures. Out: [`Columns`] of Gaussians at rest,
+//! without those whose opacity is 0: writers do not keep their colors.
 
 use super::files::Files;
 use super::meta::{Coded, Images, Palette, Wide};

@@ -4,7 +4,7 @@
 
 use super::files::Files;
 use super::meta;
-use super::sog2::{self, Still, UP};
+use super::sog2::{Described, Still, UP};
 use crate::codec::import::columns::{Columns, Played, mip_filter_of};
 use crate::codec::import::source::Beside;
 use crate::codec::import::{ImportError, Imported};
@@ -62,8 +62,8 @@ pub(super) fn read(beside: &dyn Beside, meta: &Value, options: &ReadOptions) -> 
     let mut missing = Vec::new();
     for level in 0..fields.levels.min(MOST_LEVELS) {
         let files = fields.files_of(level)?;
-        match level_of(beside, &files) {
-            Ok(Level { mut columns, mut filtered, mut lost }) => {
+        match level_of(beside, &files, fields.environment.as_deref()) {
+            Ok(Level { mut columns, mut filtered, mut lost, around }) => {
                 if !missing.is_empty() {
                     lost.push(format!(
                         "This is level {level} of its levels of detail, with {} Gaussians: files of the finer levels are missing ({}).",
@@ -72,8 +72,8 @@ pub(super) fn read(beside: &dyn Beside, meta: &Value, options: &ReadOptions) -> 
                     ));
                 }
                 let mut parts = files.len();
-                if let Some(name) = &fields.environment {
-                    match still(beside, name, None) {
+                if let Some(around) = around {
+                    match around.and_then(|around| around.still(beside, None)) {
                         Ok(around) => {
                             parts += 1;
                             filtered += usize::from(around.columns.mip_filter);
@@ -127,23 +127,39 @@ impl Fields {
 }
 
 /// The Gaussians of a level.
-struct Level {
+struct Level<'n> {
     columns: Columns,
     /// The number of files whose Gaussians were trained with the filter of Mip-Splatting.
     filtered: usize,
     /// What they lose.
     lost: Vec<String>,
+    /// The surroundings, if there are any.
+    around: Option<Result<Part<'n>, ImportError>>,
 }
 
-/// Reads the Gaussians of a level, file by file.
-fn level_of(beside: &dyn Beside, files: &BTreeMap<&str, Vec<Range<usize>>>) -> Result<Level, ImportError> {
+/// A `meta.json` with Gaussians, not yet read.
+struct Part<'n> {
+    name: &'n str,
+    described: Described,
+}
+
+/// Reads the Gaussians of a level, file by file, once the files of all of them are there.
+fn level_of<'n>(
+    beside: &dyn Beside,
+    files: &BTreeMap<&'n str, Vec<Range<usize>>>,
+    environment: Option<&'n str>,
+) -> Result<Level<'n>, ImportError> {
+    let described = parts(beside, files.keys().copied())?;
+    let around = match environment.map(|name| parts(beside, [name])) {
+        Some(Err(ImportError::Io(error))) if error.kind() == io::ErrorKind::WouldBlock => return Err(error.into()),
+        around => around.and_then(|around| around.map(|mut parts| parts.pop()).transpose()),
+    };
     let (mut all, mut lost, mut filtered) = (None, Vec::new(), 0);
-    for (name, ranges) in files {
-        let own = still(beside, name, Some(ranges))?;
+    for (part, ranges) in described.iter().zip(files.values()) {
+        let own = part.still(beside, Some(ranges))?;
         let several = files.len() > 1;
-        lost.extend(
-            own.lost.into_iter().map(|text| if several { format!("{}: {text}", printable(name)) } else { text }),
-        );
+        let name = printable(part.name);
+        lost.extend(own.lost.into_iter().map(|text| if several { format!("{name}: {text}") } else { text }));
         filtered += usize::from(own.columns.mip_filter);
         match &mut all {
             None => all = Some(own.columns),
@@ -151,12 +167,37 @@ fn level_of(beside: &dyn Beside, files: &BTreeMap<&str, Vec<Range<usize>>>) -> R
         }
     }
     let columns: Columns = all.ok_or_else(|| ImportError::damaged("its lod-meta.json has no Gaussians"))?;
-    Ok(Level { columns, filtered, lost })
+    Ok(Level { columns, filtered, lost, around })
 }
 
-/// Reads the Gaussians of one `meta.json`.
-fn still(beside: &dyn Beside, name: &str, ranges: Option<&[Range<usize>]>) -> Result<Still, ImportError> {
-    let meta = meta::parse(&printable(name), &beside.read(name)?)?;
-    let folder = name.rsplit_once('/').map_or("", |(folder, _)| folder);
-    sog2::columns(&mut Files::beside(beside, folder), &meta, ranges)
+/// Reads files `meta.json`, and announces all their textures.
+fn parts<'n>(beside: &dyn Beside, names: impl IntoIterator<Item = &'n str>) -> Result<Vec<Part<'n>>, ImportError> {
+    let names: Vec<&str> = names.into_iter().collect();
+    beside.announce(&names.iter().map(|&name| name.to_owned()).collect::<Vec<_>>())?;
+    let part = |name: &'n str| -> Result<Part<'n>, ImportError> {
+        let meta = meta::parse(&printable(name), &beside.read(name)?)?;
+        Ok(Part { name, described: Described::of(&meta)? })
+    };
+    let parts = names.into_iter().map(part).collect::<Result<Vec<_>, _>>()?;
+    let textures: Vec<String> = parts.iter().flat_map(Part::textures).collect();
+    beside.announce(&textures)?;
+    Ok(parts)
+}
+
+impl Part<'_> {
+    /// Returns its folder, empty or with a slash at its end.
+    fn folder(&self) -> &str {
+        self.name.rfind('/').map_or("", |slash| &self.name[..=slash])
+    }
+
+    /// Returns the paths of its textures.
+    fn textures(&self) -> impl Iterator<Item = String> {
+        let folder = self.folder();
+        self.described.textures().map(move |name| format!("{folder}{name}"))
+    }
+
+    /// Reads its Gaussians: those in the ranges given, or all.
+    fn still(&self, beside: &dyn Beside, ranges: Option<&[Range<usize>]>) -> Result<Still, ImportError> {
+        self.described.still(&mut Files::beside(beside, self.folder().trim_end_matches('/')), ranges)
+    }
 }

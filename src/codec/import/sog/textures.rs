@@ -98,6 +98,8 @@ pub(super) fn read<'n>(
     files: &mut Files,
     names: impl IntoIterator<Item = &'n str>,
 ) -> Result<Vec<Encoded>, ImportError> {
+    let names: Vec<&str> = names.into_iter().collect();
+    files.announce(names.iter().copied())?;
     names.into_iter().map(|name| Encoded::read(files, name)).collect()
 }
 

@@ -8,7 +8,7 @@ use super::sog2::invisible;
 use super::splats::{self, Layout};
 use super::textures::{self, Texture};
 use crate::codec::import::columns::{Motion, Played};
-use crate::codec::import::{ImportError, Imported};
+use crate::codec::import::{ImportError, Imported, assumed};
 use crate::codec::options::ReadOptions;
 use crate::codec::text::printable;
 use crate::scene::{ActiveSets, FilterKind, MAX_SEGMENTS, TemporalFilter, UpAxis};
@@ -155,7 +155,15 @@ pub(super) fn read(files: &mut Files, meta: &Value, options: &ReadOptions) -> Re
     if let Some(rate) = fields.playback.rate.filter(|&rate| rate != 1.0) {
         lost.push(format!("It is meant to be played at {rate} times its speed: set the speed of the playback."));
     }
-    let played = Played { duration_seconds: duration(&fields, &moving, options)?, ..Played::still(UpAxis::PosY) };
+    let duration_seconds = duration(&fields, &moving, options)?;
+    let is_stated = fields.playback.duration.is_some();
+    let has_speed = fields.playback.fps.or(fields.fps).is_some();
+    match &moving {
+        Moving::Frames { frames, .. } if !is_stated && !has_speed => lost.extend(assumed::speed(frames, options)),
+        Moving::Continuous { .. } if !is_stated => lost.extend(assumed::duration(duration_seconds, options)),
+        _ => {}
+    }
+    let played = Played { duration_seconds, ..Played::still(UpAxis::PosY) };
     Ok(Imported { scene: columns.into_scene(played, options)?, lost })
 }
 
