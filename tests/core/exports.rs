@@ -333,11 +333,19 @@ fn the_filter_of_mip_splatting_comes_back_or_is_stated() {
     let mut scene = resting(0);
     for mip_filter in [false, true] {
         scene.trained_with.mip_filter = mip_filter;
-        for id in ["spz", "ply", "splat", "gltf"] {
+        for (id, has_filter) in [
+            ("spz", true),
+            ("ply", true),
+            ("free-time", true),
+            ("sog", true),
+            ("sogst", false),
+            ("splat", false),
+            ("gltf", false),
+        ] {
             let is_stated = exporter(&scene, id).lost().iter().any(|sentence| sentence.contains("Mip-Splatting"));
-            assert_eq!(is_stated, mip_filter && id != "spz", "{id}: whether it is lost");
+            assert_eq!(is_stated, mip_filter && !has_filter, "{id}: whether it is lost");
             let found = again(&scene, id, 0.0).trained_with.mip_filter;
-            assert_eq!(found, mip_filter && id == "spz", "{id}: whether the file has it");
+            assert_eq!(found, mip_filter && has_filter, "{id}: whether the file has it");
         }
     }
 }

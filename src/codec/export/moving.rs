@@ -9,7 +9,7 @@ use super::error::ExportError;
 use super::still::Ready;
 use crate::codec::import::columns::{Columns, Motion};
 use crate::gaussian::Gaussian;
-use crate::scene::{FilterKind, GaussianScene};
+use crate::scene::{FilterKind, GaussianScene, TrainedWith};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
@@ -20,7 +20,8 @@ use std::f64::consts::TAU;
 pub(crate) fn moving(scene: &GaussianScene, keeps_filter: bool) -> Result<(Columns, Vec<String>), ExportError> {
     let ready = Ready::of(scene)?;
     let mut lost = Vec::new();
-    let mut columns = Columns { origin: scene.trained_with.origin.place, ..Columns::default() };
+    let TrainedWith { origin, mip_filter, .. } = &scene.trained_with;
+    let mut columns = Columns { origin: origin.place, mip_filter: *mip_filter, ..Columns::default() };
     match &scene.filter {
         Some(filter) if keeps_filter => columns.filter = Some(filter.clone()),
         Some(filter) if filter.kind != FilterKind::Support => {

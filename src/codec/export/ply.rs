@@ -2,7 +2,8 @@
 //!
 //! In: [`Columns`]. Out: binary little-endian floats, with the properties of the original trainer in its order.
 //! Positions are those of the capture: a comment states the axis that points up, unless it is -y as in files of
-//! trainers. If the capture has an origin, positions are those of its files, in double precision.
+//! trainers. If the capture has an origin, positions are those of its files, in double precision. Another comment states
+//! training with the filter of Mip-Splatting.
 
 use super::clip::Clip;
 use crate::codec::import::columns::{Columns, Motion};
@@ -13,6 +14,8 @@ use std::io::{self, Write};
 
 /// The comment with the shortest lifespan, which is 0: lifespans are exported unchanged.
 const SHORTEST: &str = "min_duration 0";
+/// The comment about training with the filter of Mip-Splatting, as Brush writes it.
+const MIP_FILTER: &str = "SplatRenderMode: mip";
 /// Temporal deviation of a Gaussian that is always present, in clip lengths: its marginal is 1 in single precision.
 const ALWAYS: f32 = 1e4;
 
@@ -73,7 +76,8 @@ fn write_header(
     writer: &mut dyn Write,
 ) -> io::Result<()> {
     let mut header = "ply\nformat binary_little_endian 1.0\n".to_owned();
-    for comment in comments.iter().chain(&space(columns, clip)) {
+    let mip_filter = columns.mip_filter.then(|| MIP_FILTER.to_owned());
+    for comment in comments.iter().chain(&space(columns, clip)).chain(&mip_filter) {
         header += &format!("comment {comment}\n");
     }
     header += &format!("element vertex {}\n", columns.len());

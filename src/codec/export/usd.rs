@@ -2,7 +2,8 @@
 //!
 //! In: [`Columns`] at rest or with motion, and the frames of the clip. Out: the file, +Y up. Of moving Gaussians,
 //! positions and opacities have a sample for each frame; if it takes less space, as with a sequence of separate sets of
-//! Gaussians, each frame has all values of its visible ones instead.
+//! Gaussians, each frame has all values of its visible ones instead. Players interpolate between samples with the same
+//! number of values: a frame of other Gaussians than the frame before, but as many, has one more, which is invisible.
 
 use super::clip::Clip;
 use super::y_up::y_up;
@@ -27,15 +28,15 @@ pub(super) fn write(columns: &Columns, clip: &Clip, writer: &mut dyn Write) -> i
         write!(writer, "    {}", attribute.name)?;
         if frames.is_sampled(attribute) {
             writeln!(writer, ".timeSamples = {{")?;
-            for (frame, &time) in frames.times.iter().enumerate() {
+            for frame in 0..frames.times.len() {
                 write!(writer, "        {frame}: ")?;
-                write_values(columns, &frames, attribute, Some(time), &mut writer)?;
+                write_values(columns, &frames, attribute, frame, &mut writer)?;
                 writeln!(writer, ",")?;
             }
             writeln!(writer, "    }}")?;
         } else {
             write!(writer, " = ")?;
-            write_values(columns, &frames, attribute, None, &mut writer)?;
+            write_values(columns, &frames, attribute, 0, &mut writer)?;
             writeln!(writer)?;
         }
     }
@@ -104,6 +105,8 @@ struct Frames {
     moves: bool,
     /// Whether each frame has only its visible Gaussians.
     is_separate: bool,
+    /// The separate frames with an invisible Gaussian at their end.
+    is_padded: Vec<bool>,
     interval: [f32; 2],
     cutoff: f32,
 }
@@ -115,7 +118,14 @@ impl Frames {
         let steps = (f64::from(clip.duration_seconds) * f64::from(clip.fps)).round();
         let moves = (!columns.motion.is_empty() || columns.filter.is_some()) && steps >= 1.0;
         if !moves {
-            return Ok(Self { times: vec![first], moves, is_separate: false, interval, cutoff });
+            return Ok(Self {
+                times: vec![first],
+                moves,
+                is_separate: false,
+                is_padded: vec![false],
+                interval,
+                cutoff,
+            });
         }
         if steps > MOST_FRAMES {
             let reason = format!("{steps} frames are too many for a USD file: state fewer frames a second");
@@ -123,15 +133,36 @@ impl Frames {
         }
         let time = |step: u32| (f64::from(first) + f64::from(last - first) * (f64::from(step) / steps)) as f32;
         let times: Vec<f32> = (0..=steps as u32).map(time).collect();
-        let mut frames = Self { times, moves, is_separate: false, interval, cutoff };
+        let is_padded = vec![false; times.len()];
+        let mut frames = Self { times, moves, is_separate: false, is_padded, interval, cutoff };
         // Numbers of a Gaussian. Frames with all Gaussians sample only 4 of them: position and opacity.
         let values = 11 + columns.harmonics.coefficients * 3;
-        let is_visible = |index: usize, time: f32| frames.moment(columns, index, time).opacity > 0.0;
-        let visible = |time: f32| (0..columns.len()).filter(|&index| is_visible(index, time)).count();
-        let visible: usize = frames.times.iter().map(|&time| visible(time)).sum();
+        let visible: usize = (0..frames.times.len()).map(|frame| frames.visible(columns, frame).count()).sum();
         let together = columns.len() * (values - 4 + 4 * frames.times.len());
         frames.is_separate = visible * values < together;
+        if frames.is_separate {
+            frames.pad(columns);
+        }
         Ok(frames)
+    }
+
+    /// Returns the visible Gaussians of a frame.
+    fn visible(&self, columns: &Columns, frame: usize) -> impl Iterator<Item = usize> {
+        let time = self.times[frame];
+        (0..columns.len()).filter(move |&index| self.moment(columns, index, time).opacity > 0.0)
+    }
+
+    /// Gives a frame whose Gaussians are others than those of the frame before a different number of values.
+    fn pad(&mut self, columns: &Columns) {
+        let (mut before, mut was_padded) = (Vec::<usize>::new(), false);
+        for frame in 0..self.times.len() {
+            let own: Vec<usize> = self.visible(columns, frame).collect();
+            if own != before {
+                was_padded = !own.is_empty() && own.len() == before.len() + usize::from(was_padded);
+                before = own;
+            }
+            self.is_padded[frame] = was_padded;
+        }
     }
 
     /// Returns whether an attribute has a sample for each frame.
@@ -187,26 +218,30 @@ fn write_head(columns: &Columns, frames: &Frames, clip: &Clip, writer: &mut dyn 
     writeln!(writer, "    uniform int radiance:sphericalHarmonicsDegree = {}", columns.harmonics.degree)
 }
 
-/// Writes the array of an attribute: of all Gaussians, or of those that are visible in a frame.
+/// Writes the array of an attribute: of all Gaussians at the time of a frame, or of those that are visible then.
 fn write_values(
     columns: &Columns,
     frames: &Frames,
     attribute: &Attribute,
-    time: Option<f32>,
+    frame: usize,
     writer: &mut dyn Write,
 ) -> io::Result<()> {
     write!(writer, "[")?;
-    let mut is_first = true;
+    let mut last = None;
     for index in 0..columns.len() {
-        let moment = frames.moment(columns, index, time.unwrap_or(frames.interval[0]));
+        let moment = frames.moment(columns, index, frames.times[frame]);
         if frames.is_separate && moment.opacity <= 0.0 {
             continue;
         }
-        if !is_first {
+        if last.is_some() {
             write!(writer, ", ")?;
         }
-        is_first = false;
         (attribute.write)(columns, index, &moment, writer)?;
+        last = Some((index, moment.mean));
+    }
+    if let Some((index, mean)) = last.filter(|_| frames.is_padded[frame]) {
+        write!(writer, ", ")?;
+        (attribute.write)(columns, index, &Moment { mean, opacity: 0.0 }, writer)?;
     }
     write!(writer, "]")
 }
@@ -294,6 +329,11 @@ mod tests {
         let [x, y, z] = columns.mean[20];
         assert!(positions[20].starts_with(&format!("20: [({x}, {y}, {z}), ")), "the third set begins at one half");
         assert_eq!(positions[20].matches('(').count(), 10, "10 of 40 Gaussians");
+        let numbers =
+            [9, 10, 19, 20, 30].map(|frame| [positions[frame], scales[frame]].map(|of| of.matches('(').count()));
+        let expected = [[10; 2], [11; 2], [11; 2], [10; 2], [11; 2]];
+        assert_eq!(numbers, expected, "no two sets that follow each other have as many, so that none is interpolated");
+        assert!(values(&text, "opacities")[10].ends_with(", 0],"), "the Gaussian that is added is invisible");
     }
 
     #[test]

@@ -24,6 +24,9 @@ pub(in crate::codec::export) fn write(columns: &Columns, clip: &Clip, writer: &m
     let mut textures = attributes.textures();
     textures.extend(attributes.labels());
     let mut meta = json!({ "version": 2 });
+    if columns.mip_filter {
+        meta["model"] = json!("antialiased");
+    }
     attributes.describe(&mut meta);
     let meta = Entry { name: "meta.json".to_owned(), bytes: serde_json::to_vec(&meta)? };
     let textures = encode("", &order, &textures)?;
