@@ -37,6 +37,7 @@ pub(crate) mod error;
 pub(crate) mod format;
 pub(crate) mod formats;
 pub(crate) mod gaps;
+pub(crate) mod mask;
 pub(crate) mod point_cloud;
 pub(crate) mod selection;
 pub(crate) mod split;

@@ -65,6 +65,19 @@ fn cameras_go_with_their_frames_by_name() {
 }
 
 #[test]
+fn the_test_camera_is_that_of_the_file_whatever_the_name_of_its_footage() {
+    let folder = Folder::new();
+    let models = [model("camera_0001", 1), model("camera_0002", 2), model("camera_0001_0", 3)];
+    folder.write_json("models.json", &json!(models));
+    for name in ["Camera_0001", "camera-0002", "camera_0001_0"] {
+        picture(&folder, &format!("{name}/0.png"), [9, 9, 9]);
+    }
+    assert_eq!(names(&open(&folder, Split::Test).views), ["Camera_0001_0"], "of another letter case");
+    let train = open(&folder, Split::Train);
+    assert_eq!(names(&train.views), ["camera-0002_0", "camera_0001_0_0"], "another camera whose name begins alike");
+}
+
+#[test]
 fn the_example_of_the_publisher_has_its_pixel() {
     let folder = Folder::new();
     let mut other = published();

@@ -3,6 +3,7 @@
 //! In: sizes, lenses, poses and times of a file, in double precision and its own coordinates. Out: views in single
 //! precision, counted from an origin.
 
+pub(crate) mod axes;
 pub(crate) mod camera_options;
 pub(crate) mod clock;
 pub(crate) mod distortion;

@@ -295,14 +295,14 @@ impl CameraFile {
         self.form == Form::Transforms && self.path.file_name().is_some_and(|name| name == SINGLE)
     }
 
-    /// Returns the meaning of the times: films have the entry `seconds`, the seconds of the times 0 and 1; frames of a
-    /// single file may have numbers in place of times.
+    /// Returns the meaning of the times: films have the entry `seconds`, the seconds of the times 0 and 1; frames may
+    /// have numbers in place of times.
     pub(crate) fn clock(&self) -> Clock {
         let seconds = self.entry("seconds").and_then(|entry| <[f32; 2]>::deserialize(entry).ok());
         let length = seconds.map(|[first, last]| last - first).filter(|length| length.is_finite() && *length > 0.0);
         match length {
             Some(unit_seconds) => Clock { unit_seconds, is_numbered: false },
-            None if self.first_number().is_some() => Clock::NUMBERED,
+            None if self.is_numbered() => Clock::NUMBERED,
             None => Clock::default(),
         }
     }
@@ -310,11 +310,16 @@ impl CameraFile {
     /// Returns the least number of a frame, which is time 0, if the frames of a single file have numbers and no times.
     /// Files of splits have no first number in common.
     fn first_number(&self) -> Option<f64> {
-        if !self.is_single() || self.has_entry("time") {
+        if !self.is_single() || !self.is_numbered() {
             return None;
         }
         let numbers = self.entries().iter().filter_map(|entry| entry.get("frame_number")?.as_f64());
         numbers.reduce(f64::min)
+    }
+
+    /// Returns whether frames have numbers in place of times.
+    fn is_numbered(&self) -> bool {
+        self.form == Form::Transforms && !self.has_entry("time") && self.has_entry("frame_number")
     }
 
     /// Returns whether a frame has an entry; `null` is no entry.
@@ -392,4 +397,25 @@ fn golden_frame(entry: &Value, file: &Value) -> Result<Parsed, FrameProblem> {
 
 fn finite_time(time: f64) -> Result<f64, FrameProblem> {
     if (time as f32).is_finite() { Ok(time) } else { Err(FrameProblem::Time(time)) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn numbers_in_place_of_times_are_no_shares_of_an_interval() {
+        let clock = |file: &str, frame: Value| {
+            let json = json!({ "frames": [frame] });
+            CameraFile { path: file.into(), form: Form::Transforms, json }.clock()
+        };
+        for file in ["transforms_train.json", "transforms_test.json", SINGLE] {
+            let numbered = clock(file, json!({ "frame_number": 12, "time": null }));
+            assert_eq!(numbered, Clock::NUMBERED, "{file} has numbers");
+            let both = clock(file, json!({ "frame_number": 12, "time": 0.4 }));
+            assert_eq!(both, Clock::default(), "{file} has times");
+        }
+        assert_eq!(clock(SINGLE, json!({})), Clock::default(), "neither");
+    }
 }

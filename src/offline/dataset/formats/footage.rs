@@ -24,6 +24,7 @@ use crate::offline::dataset::{CameraOptions, Clock, DatasetError};
 use glam::{DMat4, UVec2};
 use std::collections::{HashMap, HashSet};
 use std::ffi::OsStr;
+use std::iter::repeat_n;
 use std::path::{Path, PathBuf};
 
 /// Folders in which footage lies: that of the dataset, and these in it.
@@ -116,6 +117,19 @@ pub(crate) fn read(
     read_by(folder, calibration, &Clocks::default(), options, videos)
 }
 
+/// Reads as [`read`], and returns the place in the calibration of the camera of each view, too.
+///
+/// # Errors
+/// As [`read`].
+pub(crate) fn read_with_cameras(
+    folder: &Path,
+    calibration: Calibration,
+    options: &CameraOptions,
+    videos: Videos<'_>,
+) -> Result<(Undivided, Vec<usize>), DatasetError> {
+    read_all(folder, calibration, &Clocks::default(), options, videos)
+}
+
 /// Reads as [`read`], with clocks of the cameras that are not the same.
 ///
 /// # Errors
@@ -125,8 +139,19 @@ pub(crate) fn read_by(
     calibration: Calibration,
     clocks: &Clocks,
     options: &CameraOptions,
-    mut videos: Videos<'_>,
+    videos: Videos<'_>,
 ) -> Result<Undivided, DatasetError> {
+    Ok(read_all(folder, calibration, clocks, options, videos)?.0)
+}
+
+/// Reads the views, and the place in the calibration of the camera of each.
+fn read_all(
+    folder: &Path,
+    calibration: Calibration,
+    clocks: &Clocks,
+    options: &CameraOptions,
+    mut videos: Videos<'_>,
+) -> Result<(Undivided, Vec<usize>), DatasetError> {
     let Calibration { source, cameras, mut notes } = calibration;
     let mut footage = footage(folder)?;
     footage.iter_mut().for_each(|one| one.rate = one.rate.or(clocks.rate));
@@ -145,10 +170,12 @@ pub(crate) fn read_by(
         DatasetError::Frame { path, frame, problem } => unusable(&path, format!("camera {}: {problem}", names(frame))),
         other => other,
     };
-    let Placed { views, origin, notes: undone } =
-        standing::views(folder, &source, at_times(filmed, &clocks.late), options).map_err(named)?;
+    let standing = at_times(filmed, &clocks.late);
+    let of_views = standing.iter().flat_map(|camera| repeat_n(camera.index, camera.shots.len())).collect();
+    let Placed { views, origin, notes: undone } = standing::views(folder, &source, standing, options).map_err(named)?;
     notes.extend(undone);
-    Ok(Undivided { source, views, splits: None, clock: Clock::NUMBERED, points: points_beside(folder), notes, origin })
+    let points = points_beside(folder);
+    Ok((Undivided { source, views, splits: None, clock: Clock::NUMBERED, points, notes, origin }, of_views))
 }
 
 /// Returns the cameras with the times of their frames. The first number of all cameras is time 0, of that camera whose

@@ -73,24 +73,19 @@ pub(crate) fn read(folder: &Path, options: &CameraOptions, videos: Videos<'_>) -
         let camera = model.and_then(|model| model.camera());
         models.push(camera.map_err(|problem| DatasetError::Frame { path: source.clone(), frame, problem })?);
     }
-    let widths: Vec<(String, f64)> =
-        models.iter().filter_map(|camera| Some((prefix(&camera.name), fisheye_width(camera)?))).collect();
+    let widths: Vec<Option<f64>> = models.iter().map(fisheye_width).collect();
+    let test = models.iter().position(|camera| camera.name == TEST);
     let calibration = Calibration { source, cameras: models, notes: Vec::new() };
-    let mut all = footage::read(folder, calibration, options, videos)?;
-    let test = prefix(TEST);
-    let is_test = |view: &TrainingView| view.name.starts_with(&test);
-    if all.views.iter().any(is_test) && !all.views.iter().all(is_test) {
-        let split = |view: &TrainingView| Some(if is_test(view) { Split::Test } else { Split::Train });
-        all.splits = Some(all.views.iter().map(split).collect());
+    let (mut all, cameras) = footage::read_with_cameras(folder, calibration, options, videos)?;
+    // Footage has the names of the cameras but for letter case and signs.
+    let is_test = |camera: &usize| Some(*camera) == test;
+    if cameras.iter().any(is_test) && !cameras.iter().all(is_test) {
+        let split = |camera: &usize| Some(if is_test(camera) { Split::Test } else { Split::Train });
+        all.splits = Some(cameras.iter().map(split).collect());
         all.notes.push(format!("{TEST} is the test camera, as in published figures"));
     }
-    all.notes.extend(narrowed(&all.views, &widths));
+    all.notes.extend(narrowed(&all.views, &cameras, &widths));
     Ok(all)
-}
-
-/// Returns the beginning of the names of the views of a camera.
-fn prefix(camera: &str) -> String {
-    format!("{camera}_")
 }
 
 impl Model {
@@ -151,17 +146,18 @@ fn angle(distance: f64, [k1, k2, k3, k4]: [f64; COEFFICIENTS]) -> f64 {
     high
 }
 
-/// Returns a sentence about the border that pictures of fisheye lenses lose, by the camera that loses most. The cameras
-/// are given by the beginnings of the names of their views, with the angles that their pictures are wide.
-fn narrowed(views: &[TrainingView], widths: &[(String, f64)]) -> Option<String> {
-    let kept = |(name, width): &(String, f64)| {
-        let view = views.iter().find(|view| view.name.starts_with(name))?;
+/// Returns a sentence about the border that pictures of fisheye lenses lose, by the camera that loses most. `cameras`
+/// are those of the views, `widths` the angles that the pictures of each camera are wide.
+fn narrowed(views: &[TrainingView], cameras: &[usize], widths: &[Option<f64>]) -> Option<String> {
+    let kept = |(camera, width): (usize, &Option<f64>)| {
+        let width = (*width)?;
+        let view = views.get(cameras.iter().position(|of_view| *of_view == camera)?)?;
         let Lens::Intrinsics { focal, center } = view.camera.lens else { return None };
         let sides = [center.x, view.camera.size.x as f32 - center.x].map(|side| f64::from(side / focal.x).atan());
-        Some([*width, sides.iter().sum()].map(f64::to_degrees))
+        Some([width, sides.iter().sum()].map(f64::to_degrees))
     };
     let lost = |[width, kept]: &[f64; 2]| width - kept;
-    let most = widths.iter().filter_map(kept).max_by(|a, b| lost(a).total_cmp(&lost(b)));
+    let most = widths.iter().enumerate().filter_map(kept).max_by(|a, b| lost(a).total_cmp(&lost(b)));
     let [width, kept] = most.filter(|most| lost(most) >= 1.0)?;
     Some(format!(
         "pictures of fisheye lenses, up to {width:.0} degrees wide, become pinhole pictures of {kept:.0} degrees: what \

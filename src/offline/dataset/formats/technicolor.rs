@@ -261,13 +261,11 @@ fn of_footage(
     };
     let cameras: Vec<RigCamera> = lines.iter().enumerate().map(camera).collect();
     let (test, count) = TEST;
-    let test = cameras.get(test).filter(|_| lines.len() == count).map(|camera| format!("{}_", camera.name));
     let calibration = Calibration { source, cameras, notes: Vec::new() };
-    let mut all = footage::read(folder, calibration, options, videos)?;
-    let is_test = |view: &TrainingView| test.as_ref().is_some_and(|test| view.name.starts_with(test));
-    if all.views.iter().any(is_test) {
-        let split = |view: &TrainingView| Some(if is_test(view) { Split::Test } else { Split::Train });
-        all.splits = Some(all.views.iter().map(split).collect());
+    let (mut all, of_views) = footage::read_with_cameras(folder, calibration, options, videos)?;
+    if lines.len() == count && of_views.contains(&test) {
+        let split = |camera: &usize| Some(if *camera == test { Split::Test } else { Split::Train });
+        all.splits = Some(of_views.iter().map(split).collect());
         all.notes.push(test_note());
     }
     Ok(all)

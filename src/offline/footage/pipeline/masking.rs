@@ -7,6 +7,7 @@
 
 use super::output::{Listed, Unfinished, listed};
 use crate::offline::dataset::TrainingView;
+use crate::offline::dataset::mask::INSIDE;
 use crate::offline::footage::plates::{masks, plate};
 use crate::offline::footage::take::{Filmed, Frame, Take};
 use crate::offline::footage::working::WorkingPictures;
@@ -30,8 +31,6 @@ const GIVEN: [&str; 2] = ["seg", MOTION];
 const FEWEST: usize = 4;
 /// Pictures that are in memory at once.
 const AT_ONCE: usize = 240;
-/// Value from which a pixel of a given mask is inside; 1 in masks that are labels.
-const INSIDE: u8 = 128;
 
 /// The names of frames, by the paths of their images.
 pub(super) type Names<'a> = HashMap<&'a Path, &'a str>;
@@ -208,6 +207,7 @@ fn given_mask(frame: &Frame, path: &Path) -> Result<GrayImage, FootageError> {
     let covered = view.load_covered()?;
     let values: Vec<u8> = covered.texels.iter().map(|&[red, green, blue, _]| red.max(green).max(blue)).collect();
     let are_labels = values.iter().all(|value| *value < INSIDE);
+    // Labels of objects are 1 and more.
     let inside = if are_labels { 1 } else { INSIDE };
     let bytes = values.into_iter().map(|value| if value >= inside { u8::MAX } else { 0 }).collect();
     Ok(GrayImage::from_raw(covered.size.x, covered.size.y, bytes).unwrap_or_default())

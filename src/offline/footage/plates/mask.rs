@@ -1,14 +1,15 @@
 //! Masks of what moves before a camera that stands still.
 //!
 //! In: pictures of a camera and its plate. Out: a mask for each picture: 0 where it shows the background, 255 where it
-//! does not, 128 and more in what is taken to move. At most [`UNKNOWN`] where the background is not known, so that the
-//! picture cannot tell.
+//! does not, [`INSIDE`] and more in what is taken to move. At most [`UNKNOWN`] where the background is not known, so
+//! that the picture cannot tell.
 
 use super::morphology::{closed, filled, opened, seeded, without_specks};
 use super::plate::Plate;
 use super::reference::Reference;
 use super::shadow::relit;
 use super::window::box_mean;
+use crate::offline::dataset::mask::INSIDE;
 use glam::UVec2;
 use image::{GrayImage, Luma, RgbImage};
 use rayon::prelude::*;
@@ -65,8 +66,8 @@ fn mask(picture: &RgbImage, reference: &Reference<'_>, unknown: &[bool], smalles
     let value = |index: usize| {
         let part = (ramp[index] * 127.0) as u8;
         match (whole[index], unknown[index] && !moving[index]) {
-            (true, true) => (part + 128).min(UNKNOWN),
-            (true, false) => part + 128,
+            (true, true) => (part + INSIDE).min(UNKNOWN),
+            (true, false) => part + INSIDE,
             (false, _) => part,
         }
     };

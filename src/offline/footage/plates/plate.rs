@@ -6,6 +6,7 @@
 //! camera.
 
 use super::exposure::{Exposed, color, pixel_count};
+use crate::offline::dataset::mask::INSIDE;
 use glam::Vec3;
 use image::{GrayImage, RgbImage};
 use rayon::prelude::*;
@@ -26,8 +27,6 @@ const NEAR: f32 = 3.0;
 const NEAR_AT_LEAST: f32 = 2.0;
 /// Bytes of a picture that are done at once.
 const CHUNK: usize = 4096;
-/// Value from which a mask says that a pixel moves.
-const MOVES: u8 = 128;
 
 /// A picture, and what moves in it, if that is known.
 type Seen<'a> = (&'a RgbImage, Option<&'a GrayImage>);
@@ -85,7 +84,7 @@ fn chosen<'a>(pictures: &'a [RgbImage], moving: &'a [Option<GrayImage>]) -> Vec<
 
 /// Returns whether a pixel stands still, as far as a mask says.
 fn stands(mask: Option<&GrayImage>, index: usize) -> bool {
-    mask.is_none_or(|mask| mask.as_raw()[index] < MOVES)
+    mask.is_none_or(|mask| mask.as_raw()[index] < INSIDE)
 }
 
 /// Returns the median of each byte of at most [`MOST`] pictures of one size: of those in which its pixel stands still,

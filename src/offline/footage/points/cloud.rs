@@ -26,7 +26,7 @@ pub(crate) struct Masked {
     pub camera: usize,
     /// Without lens distortion.
     pub picture: RgbImage,
-    /// What moves: above 127.
+    /// The mask of what moves.
     pub mask: GrayImage,
 }
 

@@ -8,14 +8,13 @@
 use super::backdrop::Backdrop;
 use super::cells;
 use super::projection::Projection;
+use crate::offline::dataset::mask::INSIDE;
 use crate::offline::train::start::region::Region;
 use crate::view::{Camera, RasterFov, View};
 use glam::{UVec2, UVec3, Vec2, Vec3};
 use image::GrayImage;
 use rayon::prelude::*;
 
-/// Masks above this value are inside.
-const INSIDE: u8 = 127;
 /// Side of the smallest cubes, pixels at the center.
 const VOXEL: f32 = 1.5;
 /// Side of the space that is searched, in sides of the [`Region`]: things at its border are whole.
@@ -103,7 +102,7 @@ impl<'a> Silhouette<'a> {
         for (y, row) in mask.as_raw().chunks_exact(width.max(1)).enumerate() {
             let mut count = 0;
             for (x, &value) in row.iter().enumerate() {
-                count += u32::from(value > INSIDE);
+                count += u32::from(value >= INSIDE);
                 sums[(y + 1) * (width + 1) + x + 1] = sums[y * (width + 1) + x + 1] + count;
             }
         }

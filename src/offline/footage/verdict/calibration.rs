@@ -10,6 +10,7 @@ use super::finding::{Finding, Severity, Subject, listed};
 use super::geometry::{center, place};
 use super::plane::median;
 use super::silhouettes::{Carved, Silhouette};
+use crate::offline::dataset::mask::INSIDE;
 use glam::Vec3;
 use std::collections::BTreeSet;
 
@@ -103,7 +104,7 @@ fn usable(evidence: &Evidence) -> (Vec<usize>, Vec<usize>) {
 /// Returns whether the mask of a picture tells a silhouette.
 fn is_usable(sample: &Sample) -> bool {
     sample.mask.as_ref().is_some_and(|mask| {
-        let covered = mask.pixels().filter(|pixel| pixel.0[0] >= 128).count() as f32;
+        let covered = mask.pixels().filter(|pixel| pixel.0[0] >= INSIDE).count() as f32;
         (COVERS[0]..=COVERS[1]).contains(&(covered / mask.pixels().len().max(1) as f32))
     })
 }

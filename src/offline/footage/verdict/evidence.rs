@@ -6,6 +6,7 @@
 
 use super::plane::Plane;
 use super::sharpness::Sharpness;
+use crate::offline::dataset::mask::INSIDE;
 use crate::offline::dataset::{DatasetError, TrainingView};
 use crate::offline::footage::take::{Filmed, Frame, Take, reduced};
 use crate::offline::footage::working::WorkingPictures;
@@ -60,7 +61,7 @@ pub(super) struct Sample {
     pub moment: usize,
     pub color: RgbImage,
     pub gray: Plane,
-    /// What moves, of the same size: 128 and more.
+    /// The mask of what moves, of the same size.
     pub mask: Option<GrayImage>,
     /// Whether it shows nothing.
     pub blank: bool,
@@ -185,7 +186,7 @@ impl Sample {
 
     /// Returns whether a pixel stands still, as far as a mask says.
     pub(super) fn stands(&self, x: u32, y: u32) -> bool {
-        self.mask.as_ref().is_none_or(|mask| mask.get_pixel(x, y).0[0] < 128)
+        self.mask.as_ref().is_none_or(|mask| mask.get_pixel(x, y).0[0] < INSIDE)
     }
 }
 

@@ -2,9 +2,9 @@
 //!
 //! In: cameras. Out: [`center`]: the point that they look at; [`Projector`]: the pixel of a point.
 
-use crate::gaussian::outer::outer;
+use crate::offline::dataset::cameras::axes::closest;
 use crate::view::{Camera, Lens};
-use glam::{DMat3, DVec3, Mat4, UVec2, Vec2, Vec3};
+use glam::{DVec3, Mat4, UVec2, Vec2, Vec3};
 
 /// Below this determinant of the mean, axes are nearly parallel and have no closest point.
 const PARALLEL: f64 = 1e-3;
@@ -26,18 +26,11 @@ fn axis(camera: &Camera) -> DVec3 {
 pub(super) fn center<'a>(cameras: impl Iterator<Item = &'a Camera>) -> DVec3 {
     let rays: Vec<(DVec3, DVec3)> = cameras.map(|camera| (place(camera), axis(camera))).collect();
     let count = rays.len().max(1) as f64;
-    let (mut sum, mut at) = (DMat3::ZERO, DVec3::ZERO);
-    for &(origin, direction) in &rays {
-        let across = DMat3::IDENTITY - outer(direction, direction);
-        sum += across;
-        at += across * origin;
-    }
     let is_ahead = |point: DVec3| {
         let ahead = rays.iter().filter(|(origin, direction)| direction.dot(point - *origin) > 0.0).count();
         2 * ahead > rays.len()
     };
-    let closest = ((sum * count.recip()).determinant() > PARALLEL).then(|| sum.inverse() * at);
-    if let Some(point) = closest.filter(|&point| is_ahead(point)) {
+    if let Some(point) = closest(rays.iter().copied(), PARALLEL).filter(|&point| is_ahead(point)) {
         return point;
     }
     let middle = rays.iter().map(|(origin, _)| *origin).sum::<DVec3>() / count;

@@ -6,6 +6,7 @@
 //! remains without any detail.
 
 use super::plane::Plane;
+use crate::offline::dataset::mask::INSIDE;
 use image::GrayImage;
 
 /// Quotient of a picture without detail.
@@ -13,8 +14,6 @@ pub(super) const NO_DETAIL: f32 = 0.25;
 /// Least number of pixels of a part, and least mean square of its gradient at half size, for a quotient.
 const FEWEST: usize = 2000;
 const TEXTURE: f64 = 4.0;
-/// Mask value from which a pixel moves.
-const MOVES: u8 = 128;
 
 /// Quotients of the energy of the gradient; `None` for a part that is too small or has no texture.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,8 +45,9 @@ fn energies(picture: &Plane, mask: Option<&GrayImage>) -> [[f64; 2]; 2] {
     let mut sums = [[0.0; 2]; 2];
     for y in 1..height.saturating_sub(1) {
         for x in 1..width.saturating_sub(1) {
-            let moves = mask
-                .is_some_and(|mask| mask.get_pixel(x * mask.width() / width, y * mask.height() / height).0[0] >= MOVES);
+            let moves = mask.is_some_and(|mask| {
+                mask.get_pixel(x * mask.width() / width, y * mask.height() / height).0[0] >= INSIDE
+            });
             let across = f64::from(picture.at(x + 1, y) - picture.at(x - 1, y));
             let down = f64::from(picture.at(x, y + 1) - picture.at(x, y - 1));
             let sum = &mut sums[usize::from(moves)];

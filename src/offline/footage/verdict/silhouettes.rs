@@ -5,6 +5,7 @@
 //! masks of the others show.
 
 use super::geometry::Projector;
+use crate::offline::dataset::mask::INSIDE;
 use crate::view::Camera;
 use glam::Vec3;
 use image::GrayImage;
@@ -15,8 +16,6 @@ const SEARCH: u32 = 48;
 const FINE: u32 = 64;
 const COARSE: u32 = 40;
 const MANY: usize = 32;
-/// Mask value from which a pixel is inside.
-const INSIDE: u8 = 128;
 /// Pixels by which masks are widened for the first search.
 const WIDER: u32 = 2;
 /// A pixel of no picture.

@@ -7,6 +7,7 @@
 use super::point::{Life, StartPoint};
 use super::region::Region;
 use crate::offline::dataset::CoveredImage;
+use crate::offline::dataset::mask::INSIDE;
 use crate::scene::random::Random;
 use crate::view::View;
 use glam::{UVec2, Vec3, Vec4};
@@ -22,8 +23,6 @@ const FEWEST: usize = 3;
 const NEARBY: f32 = 0.05;
 /// Slack of silhouettes of moments nearby, as a share of the longer side of the picture.
 const SLACK: f32 = 0.02;
-/// Coverage, 0 to 255, from which a pixel is inside.
-const INSIDE: u8 = 128;
 /// Candidates of a chunk, which are drawn one after the other with one seed.
 const AT_ONCE: usize = 4096;
 /// Chunks of candidates in a round, and most rounds.

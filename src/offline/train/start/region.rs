@@ -4,8 +4,9 @@
 //! pictures are there.
 
 use super::error::StartError;
+use crate::offline::dataset::cameras::axes::closest;
 use crate::view::View;
-use glam::{DMat3, DVec3, Vec3};
+use glam::{DVec3, Vec3};
 
 /// Half the side of the cube, as a share of half the width of a picture at the center (1.3 of 1.44 in D-NeRF).
 const SHARE: f64 = 0.9;
@@ -32,21 +33,14 @@ impl Region {
     pub(crate) fn of<'a>(views: impl Iterator<Item = &'a View>) -> Result<Self, StartError> {
         let cameras: Vec<Ray> = views.map(Ray::of).collect();
         let count = cameras.len().max(1) as f64;
-        let (mut sum, mut at) = (DMat3::ZERO, DVec3::ZERO);
-        for &Ray { origin, direction, .. } in &cameras {
-            let across =
-                DMat3::IDENTITY - DMat3::from_cols_array_2d(&[0, 1, 2].map(|i| (direction * direction[i]).into()));
-            sum += across;
-            at += across * origin;
-        }
         let half_at = |center: DVec3| -> Option<f64> {
             let widths = cameras.iter().map(|ray| ray.direction.dot(center - ray.origin) * ray.tan);
             let mut widths: Vec<f64> = widths.collect();
             widths.sort_by(f64::total_cmp);
             widths.get(widths.len() / 2).map(|width| SHARE * width).filter(|half| half.is_finite() && *half > 0.0)
         };
-        let crossing = (sum * count.recip()).determinant() > PARALLEL;
-        let closest = crossing.then(|| sum.inverse() * at).and_then(|center| Some((center, half_at(center)?)));
+        let crossing = closest(cameras.iter().map(|ray| (ray.origin, ray.direction)), PARALLEL);
+        let crossing = crossing.and_then(|center| Some((center, half_at(center)?)));
         let ahead = || {
             let middle = cameras.iter().map(|ray| ray.origin).sum::<DVec3>() / count;
             let spread = cameras.iter().map(|ray| ray.origin.distance(middle)).fold(0.0, f64::max);
@@ -56,7 +50,7 @@ impl Region {
             let center = middle + direction * AHEAD * spread;
             Some((center, half_at(center)?))
         };
-        let (center, half) = closest.or_else(ahead).ok_or(StartError::NoRegion)?;
+        let (center, half) = crossing.or_else(ahead).ok_or(StartError::NoRegion)?;
         Ok(Self { center: center.as_vec3(), half: half as f32 })
     }
 }
