@@ -37,7 +37,8 @@ impl Edited {
 /// that [ask for it](EditList::needs_cameras). If nothing is removed, the capture stays as it is.
 ///
 /// # Errors
-/// Edits that leave no Gaussian, an edit that needs `seen`, a Gaussian in the trained form that cannot be drawn.
+/// Edits whose numbers are [wrong](Edit::check), or that leave no visible Gaussian; an edit that needs `seen`; a
+/// Gaussian in the trained form that cannot be drawn.
 pub fn apply(scene: GaussianScene, list: &EditList, seen: Option<&Seen>) -> Result<Edited, EditError> {
     let (keep, removed) = kept(&scene, list, seen)?;
     let scene = if keep.len() < scene.len() { scene.select(&keep) } else { scene };
@@ -47,19 +48,22 @@ pub fn apply(scene: GaussianScene, list: &EditList, seen: Option<&Seen>) -> Resu
 /// Returns the indices of the Gaussians that are kept, ascending, and the number that each edit removes.
 fn kept(scene: &GaussianScene, list: &EditList, seen: Option<&Seen>) -> Result<(Vec<u32>, Vec<usize>), EditError> {
     let gaussians = scene.gaussians()?;
+    let is_visible = |&index: &u32| gaussians[index as usize].opacity > 0.0;
     let mut keep: Vec<u32> = (0..gaussians.len() as u32).collect();
     let mut removed = Vec::with_capacity(list.edits.len());
     for (number, edit) in (1..).zip(&list.edits) {
+        edit.check().map_err(|reason| EditError::Wrong { number, name: edit.name(), reason })?;
         if edit.needs_cameras() && seen.is_none() {
             return Err(EditError::NotSeen { number, name: edit.name() });
         }
-        let before = keep.len();
+        let (before, had_visible) = (keep.len(), keep.par_iter().any(is_visible));
         let stays = |&index: &u32| {
             let index = index as usize;
             !removes(edit, index, &gaussians[index], scene, seen)
         };
         keep = keep.into_par_iter().filter(stays).collect();
-        if keep.is_empty() && before > 0 {
+        // What is left of packed blocks may be their fillers alone.
+        if before > 0 && (keep.is_empty() || had_visible && !keep.par_iter().any(is_visible)) {
             return Err(EditError::Everything { number, name: edit.name() });
         }
         removed.push(before - keep.len());
@@ -186,6 +190,23 @@ mod tests {
         let (center, radius) = ([2.0, 0.0, 0.0], 1.0);
         assert_eq!(kept_by(&all, Edit::KeepSphere { center, radius, times: None }), [1, 2, 3], "a sphere");
         assert_eq!(kept_by(&all, Edit::RemoveSphere { center, radius, times: None }), [0, 4], "the others");
+    }
+
+    #[test]
+    fn edits_that_leave_invisible_gaussians_alone_are_refused() {
+        let filler = Gaussian { opacity: 0.0, ..gaussian(3.0, 0.5, 1.0) };
+        let all = scene(vec![gaussian(0.0, 0.5, 1.0), filler]);
+        let edit = Edit::RemoveFaintLarge { opacity_below: 2.0, scale_above: 0.0 };
+        let refused = kept(&all, &EditList { edits: vec![edit] }, None).expect_err("only the filler is left");
+        assert!(matches!(refused, EditError::Everything { number: 1, .. }), "{refused}");
+    }
+
+    #[test]
+    fn numbers_of_edits_in_code_are_checked() {
+        let all = scene(vec![gaussian(0.0, 0.5, 1.0)]);
+        let edit = Edit::RemoveBox { min: [1.0; 3], max: [f32::NAN; 3], times: None };
+        let refused = kept(&all, &EditList { edits: vec![edit] }, None).expect_err("no box");
+        assert!(matches!(refused, EditError::Wrong { number: 1, .. }), "{refused}");
     }
 
     #[test]

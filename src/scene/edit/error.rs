@@ -31,7 +31,17 @@ pub enum EditListError {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum EditError {
-    /// No Gaussian would be left.
+    /// The numbers of an edit are wrong.
+    #[error("edit {number}, {name}: {reason}")]
+    Wrong {
+        /// The place of the edit in the list, from 1.
+        number: usize,
+        /// Its name.
+        name: &'static str,
+        /// What they must be.
+        reason: &'static str,
+    },
+    /// No visible Gaussian would be left.
     #[error("edit {number}, {name}, leaves no Gaussian: change its numbers, or remove it from the list")]
     Everything {
         /// The place of the edit in the list, from 1.

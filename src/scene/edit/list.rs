@@ -142,7 +142,7 @@ impl Edit {
     ///
     /// # Errors
     /// What they must be.
-    fn check(&self) -> Result<(), &'static str> {
+    pub fn check(&self) -> Result<(), &'static str> {
         match *self {
             Self::KeepBox { min, max, times } | Self::RemoveBox { min, max, times } => {
                 // A comparison with NaN is false.
