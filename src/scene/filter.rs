@@ -52,7 +52,8 @@ pub enum ActiveSets {
 pub const MAX_SEGMENTS: u32 = u16::MAX as u32;
 
 impl TemporalFilter {
-    /// Creates a filter from one set of bits for each segment, stored as bits or as intervals, whichever is smaller.
+    /// Creates a filter from one set of bits for each segment, stored as bits or as intervals, whichever is smaller;
+    /// [windows](FilterKind::Window) without gaps are always intervals.
     ///
     /// # Panics
     /// If the length of `bits` is not `segments` times the number of [`words`](Self::words) of a set.
@@ -61,7 +62,7 @@ impl TemporalFilter {
         assert_eq!(bits.len(), words * segments as usize, "one set of bits for each segment");
         let filter = Self { kind, segments, count, sets: ActiveSets::Bits(bits) };
         match filter.intervals() {
-            Some(intervals) if intervals.len() < words * segments as usize => {
+            Some(intervals) if kind == FilterKind::Window || intervals.len() < words * segments as usize => {
                 Self { sets: ActiveSets::Intervals(intervals), ..filter }
             }
             _ => filter,
@@ -70,9 +71,12 @@ impl TemporalFilter {
 
     /// Creates the support filter: Gaussian `i` is active in a segment if its marginal exceeds the cut-off anywhere in
     /// it. The marginal has one peak, so these segments are one interval. A margin covers rounding: an additional
-    /// active Gaussian changes no pixel. `interval` is the time interval of the capture, `cutoff` its cut-off,
-    /// `segments` at least 1.
+    /// active Gaussian changes no pixel. `interval` is the time interval of the capture, `cutoff` its cut-off.
+    ///
+    /// # Panics
+    /// If `segments` is not 1 to [`MAX_SEGMENTS`].
     pub fn support(gaussians: impl Iterator<Item = Gaussian>, interval: [f32; 2], cutoff: f32, segments: u32) -> Self {
+        assert!((1..=MAX_SEGMENTS).contains(&segments), "a filter of {segments} segments");
         let reach = lifespan_reach(cutoff);
         let span = f64::from(interval[1]) - f64::from(interval[0]);
         let intervals: Vec<u32> = gaussians
@@ -109,7 +113,10 @@ impl TemporalFilter {
             ActiveSets::Bits(bits) => Self::words(count).checked_mul(self.segments as usize) == Some(bits.len()),
             ActiveSets::Intervals(intervals) => intervals.len() == count,
         };
-        if self.count != count || !(1..=MAX_SEGMENTS).contains(&self.segments) || !fits {
+        if !(1..=MAX_SEGMENTS).contains(&self.segments) {
+            return Err("its temporal filter has no segment, or more than are possible");
+        }
+        if self.count != count || !fits {
             return Err("its temporal filter is that of another number of Gaussians");
         }
         let ends_within = |&word: &u32| {
@@ -130,16 +137,25 @@ impl TemporalFilter {
     }
 
     /// Returns the first and the last time at which Gaussian `index` exists; all times unless the filter is of
-    /// [windows](FilterKind::Window). The end of a segment belongs to the next one, except that of the last.
+    /// [windows](FilterKind::Window). The end of a segment belongs to the next one, except that of the last. Of bits
+    /// with gaps it is the time from the first active segment to the last.
     ///
     /// # Panics
     /// If `index` is out of range.
     pub(crate) fn window(&self, index: usize, interval: [f32; 2]) -> [f64; 2] {
-        let (FilterKind::Window, ActiveSets::Intervals(words)) = (self.kind, &self.sets) else {
+        if self.kind != FilterKind::Window {
             return [f64::NEG_INFINITY, f64::INFINITY];
-        };
+        }
         let [start, end] = interval.map(f64::from);
-        let (first, last) = (words[index] & 0xffff, words[index] >> 16);
+        let (first, last) = match &self.sets {
+            ActiveSets::Intervals(words) => (words[index] & 0xffff, words[index] >> 16),
+            ActiveSets::Bits(_) => {
+                let active = |&segment: &u32| self.is_active(segment, index);
+                let first = (0..self.segments).find(active);
+                // First after last, as of intervals, where it is never active.
+                first.map_or((1, 0), |first| (first, (first..self.segments).rev().find(active).unwrap_or(first)))
+            }
+        };
         let time = |segment: u32| start + (end - start) * f64::from(segment) / f64::from(self.segments);
         let end = time(last + 1);
         [time(first), if last + 1 < self.segments { end.next_down() } else { end }]
@@ -299,6 +315,30 @@ mod tests {
         assert!(before[1] < 0.5 && before[1] > 0.499_999, "the first ends before the border: {before:?}");
         assert_eq!(after, [0.5, 1.0], "the second has it, and the end of all");
         assert_eq!(filter.segment_of(0.5, [0.0, 1.0]), 1, "as it is drawn");
+    }
+
+    #[test]
+    fn windows_of_few_segments_are_intervals_and_bits_with_gaps_have_their_ends() {
+        let times = |bits: [u32; 4]| {
+            let filter = TemporalFilter::from_bits(FilterKind::Window, 4, 2, bits.to_vec());
+            (matches!(filter.sets, ActiveSets::Intervals(_)), [0, 1].map(|index| filter.window(index, [0.0, 4.0])))
+        };
+        let (intervals, [early, late]) = times([1, 1, 2, 2]);
+        assert!(intervals, "the times of a window are needed outside of drawing, too");
+        assert_eq!((early[0], late), (0.0, [2.0, 4.0]), "the two windows");
+        assert!(early[1] < 2.0 && early[1] > 1.999, "the first ends before the border: {early:?}");
+        let (intervals, [gap, late]) = times([1, 2, 3, 2]);
+        assert!(!intervals, "a gap is no interval");
+        assert_eq!((gap[0], late), (0.0, [1.0, 4.0]), "from the first active segment");
+        assert!(gap[1] < 3.0 && gap[1] > 2.999, "to the last: {gap:?}");
+    }
+
+    #[test]
+    fn filters_without_segments_are_said_to_have_none() {
+        let sets = ActiveSets::Intervals(vec![0]);
+        let filter = TemporalFilter { kind: FilterKind::Support, segments: 0, count: 1, sets };
+        let told = filter.check(1).expect_err("no segment");
+        assert!(told.contains("no segment"), "not another number of Gaussians: {told}");
     }
 
     fn gaussian(mean_t: f32, sigma_t: f32) -> Gaussian {
