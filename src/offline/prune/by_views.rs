@@ -47,12 +47,13 @@ impl Pruned {
 }
 
 /// Prunes by the scores in `given` or, if it is `None`, by those that the settings select. Results are compared on the
-/// validation views if the goal is a loss, or if the best score is searched for ([`ScoreChoice::Auto`]); scores then
+/// validation views if the goal is a loss, or if the best of several scores is searched for; scores then
 /// come from the other training views. Otherwise, scores come from all training views.
 ///
 /// # Errors
 /// The goal is a loss and images of validation views are missing or show another scene; views in which no Gaussian of
-/// the scene is visible; no validation views for a comparison; a failure of the engine.
+/// the scene is visible; no validation views for a comparison; the goal is a size, whose number of Gaussians a bake
+/// finds by compressing them ([`Goal::Size`]); a failure of the engine.
 pub fn prune_by_views(
     engine: &mut Engine,
     subject: Subject,
@@ -61,8 +62,11 @@ pub fn prune_by_views(
     settings: &PruneSettings,
     progress: &mut dyn Progress,
 ) -> Result<Pruned, PruneError> {
+    if matches!(settings.goal, Goal::Size(_)) {
+        return Err(PruneError::SizeOfFile);
+    }
     let count = settings.goal.count(subject.scene.len());
-    let compared = count.is_none() || (given.is_none() && settings.score == ScoreChoice::Auto);
+    let compared = count.is_none() || (given.is_none() && !matches!(settings.score, ScoreChoice::One(_)));
     let Subject { runtime, background, .. } = &subject;
     // Before scoring, so that missing images are reported at once.
     let search = if compared {

@@ -18,6 +18,9 @@ pub enum PruneError {
     /// No score can be computed.
     #[error("there is no score to prune by")]
     NoScore,
+    /// The goal is the size of a file, which only a bake compresses.
+    #[error("only a bake prunes to the size of a file: give a number or a share of Gaussians, or a loss")]
+    SizeOfFile,
     /// A choice needs validation views, and the dataset has none.
     #[error("{choice} needs validation views, and there are none")]
     NoValidation {

@@ -27,7 +27,7 @@ use std::fmt;
 pub enum ScoreChoice {
     /// The best of [`Variant::AUTO`] on the validation views.
     Auto,
-    /// Every variant.
+    /// The best of all variants that the scene can be scored by.
     All,
     /// This variant alone.
     One(Variant),
