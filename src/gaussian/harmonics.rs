@@ -95,7 +95,8 @@ impl Harmonics {
     }
 
     /// Returns the color of one Gaussian seen along the unit vector `direction` (camera to Gaussian, capture space),
-    /// with `tau = mean_t − time` and the full length of the capture's time interval, both in timestamp units. Clamped
+    /// with `tau = mean_t − time`, and `time_span`, the time after which colors repeat
+    /// ([`TrainedWith::period_of_colors`](crate::scene::TrainedWith::period_of_colors)), both in timestamp units. Clamped
     /// below at 0.
     ///
     /// # Panics

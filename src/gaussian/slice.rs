@@ -25,7 +25,7 @@ pub struct Gaussian {
     pub sigma_t: f32,
     /// Conditional covariance, upper triangle xx, xy, xz, yy, yz, zz, capture units squared.
     pub covariance: [f32; 6],
-    /// Peak opacity in (0, 1).
+    /// Peak opacity, 0 to 1; 0 of the fillers of packed blocks alone.
     pub opacity: f32,
     /// Unused; zero.
     pub padding: f32,

@@ -15,9 +15,9 @@ use std::path::PathBuf;
 
 /// Convert a checkpoint (.pth) or a package to a package (.gs4d).
 ///
-/// The conversion is lossless, except with --form runtime or a lower color degree. The package is written to a
-/// temporary file beside OUT and renamed when it is complete: an existing OUT is replaced or stays unchanged. OUT must
-/// not be IN.
+/// The conversion is lossless, except with --form runtime, a lower color degree or a --merge above 0; levels of detail
+/// are left out. The package is written to a temporary file beside OUT and renamed when it is complete: an existing OUT
+/// is replaced or stays unchanged. OUT must not be IN.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:

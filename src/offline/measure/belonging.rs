@@ -4,6 +4,7 @@
 //! scene are no closer to their own images than to the images of other views, or no closer than empty pictures.
 
 use super::MeasureError;
+use super::evaluation::color_behind;
 use super::metrics::SquaredError;
 use crate::offline::dataset::TrainingView;
 use crate::offline::dataset::selection::even_subset;
@@ -106,10 +107,7 @@ impl Chosen {
         scene: &RuntimeScene,
         background: Background,
     ) -> Result<Option<Match>, MeasureError> {
-        let color = match background {
-            Background::Color(color) => Vec3::from(color),
-            Background::None | Background::Environment => Vec3::ZERO,
-        };
+        let color = Vec3::from(color_behind(background, &scene.trained_with));
         let load = |view: &TrainingView| view.load_covered().map(|image| image.over(color));
         let images = self.0.iter().map(load).collect::<Result<Vec<_>, _>>()?;
         let [mut own, mut others, mut empty] = [SquaredError::default(); 3];

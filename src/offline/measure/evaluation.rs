@@ -19,9 +19,10 @@ use rayon::prelude::*;
 const LUMINANCE: [f32; 3] = [0.2126, 0.7152, 0.0722];
 
 /// Draws every view of a scene, with the field of view of training, and compares the picture with the image of the
-/// view. Transparent images are composited over the color of `background`, or over the color of training if
-/// `background` has none. Calls `each` with the metrics of each view, its image and its picture (not clamped), in the
-/// order of the views. Images are read and compared on all threads. Begins the task "comparing".
+/// view. Transparent images are composited over the color of `background`; over black if it is [`Background::None`], and
+/// over the color of training in front of an environment map. Calls `each` with the metrics of each view, its image and
+/// its picture (not clamped), in the order of the views. Images are read and compared on all threads. Begins the task
+/// "comparing".
 ///
 /// # Errors
 /// Images that are missing or cannot be read, no views, a failure of the engine, and errors of `each`.

@@ -27,8 +27,8 @@ pub struct ReferencePictures {
 }
 
 impl ReferencePictures {
-    /// Loads the images of these views, over the color of `background`, or over the color of training if `background`
-    /// has none.
+    /// Loads the images of these views, over the color of `background`: over black if it is [`Background::None`], and
+    /// over the color of training in front of an environment map.
     ///
     /// # Errors
     /// Images that are missing or cannot be decoded.

@@ -27,7 +27,13 @@ impl VarianceHistogram {
         let variance = |g: &Gaussian| f64::from(g.sigma_t).powi(2).log10();
         let all = before.iter().chain(after).map(variance).filter(|v| v.is_finite());
         let [low, high] = all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)]);
-        let (low, high) = if low < high { (low, high) } else { (-4.0, 1.0) };
+        let (low, high) = if low < high {
+            (low, high)
+        } else if low.is_finite() {
+            (low - 0.5, low + 0.5)
+        } else {
+            (-4.0, 1.0)
+        };
         let width = (high - low) / BINS as f64;
         let fractions = |gaussians: &[Gaussian]| {
             let mut bins = vec![0.0; BINS];
@@ -116,6 +122,14 @@ mod tests {
             "the first border is the smallest variance: {}",
             histogram.borders[0]
         );
+    }
+
+    #[test]
+    fn a_variance_that_all_gaussians_have_is_within_its_bin() {
+        let histogram = VarianceHistogram::of(&[gaussian(0.0, 100.0)], &[]);
+        let full = histogram.before.iter().position(|&share| share > 0.0).expect("the Gaussian is in a bin");
+        let [from, to] = [histogram.borders[full], histogram.borders[full + 1]];
+        assert!(from <= 1.001e4 && to >= 0.999e4, "100² is in the bin from {from} to {to}");
     }
 
     #[test]

@@ -24,7 +24,9 @@ pub(crate) fn find_packages(paths: &[PathBuf]) -> Result<Vec<PathBuf>, FileError
     let (mut found, mut seen) = (Vec::new(), HashSet::new());
     for path in paths {
         let packages = if path.is_dir() { in_folder(path)? } else { vec![path.clone()] };
-        found.extend(packages.into_iter().filter(|package| seen.insert(package.clone())));
+        // Two paths may lead to one file.
+        let same = |package: &PathBuf| fs::canonicalize(package).unwrap_or_else(|_| package.clone());
+        found.extend(packages.into_iter().filter(|package| seen.insert(same(package))));
     }
     Ok(found)
 }
@@ -72,7 +74,7 @@ mod tests {
         for name in ["a.gs4d", "a.trained.gs4d", "a.report.json", ".gs4d-x.part", "b/c.gs4d", "e.tune/f.gs4d"] {
             fs::write(path(name), "").expect("the folder can be written to");
         }
-        let found = find_packages(&[path("missing.gs4d"), folder.path().to_owned(), path("a.gs4d")]);
+        let found = find_packages(&[path("missing.gs4d"), folder.path().to_owned(), path("a.gs4d"), path("b/../a.gs4d")]);
         let expected = ["missing.gs4d", "a.gs4d", "b/c.gs4d", "d.gs4d"].map(path);
         assert_eq!(found.expect("folders that can be read"), expected, "each result once, and nothing else");
         fs::create_dir(path("empty")).expect("the folder can be written to");
