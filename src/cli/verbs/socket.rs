@@ -82,7 +82,9 @@ impl SocketVerb {
         }
         let followed = match (&self.name, self.at, self.time) {
             (Some(name), Some(position), Some(time)) => {
-                let samples = self.samples(scene.playback.duration_seconds)?;
+                let others = scene.sockets.iter().filter(|socket| socket.name != *name);
+                let taken = others.map(|socket| socket.samples.len()).sum();
+                let samples = self.samples(scene.playback.duration_seconds, taken)?;
                 let placement = Placement { name: name.clone(), position, time, samples };
                 let followed = follow(&scene, &placement, &mut Bars::default());
                 let followed = followed.map_err(|error| Failure::at(&self.scene, &error))?;
@@ -102,7 +104,7 @@ impl SocketVerb {
     /// Compares sockets with the known tracks of the points in a file.
     fn compare(&self, scene: &GaussianScene, file: &Path) -> Result<Report, Failure> {
         let known = KnownPoint::read(file, &scene.trained_with.origin)?;
-        let samples = self.samples(scene.playback.duration_seconds)?;
+        let samples = self.samples(scene.playback.duration_seconds, 0)?;
         let compared = compare(scene, &known, samples, &mut Bars::default());
         let Comparison { size, points } = compared.map_err(|error| Failure::at(&self.scene, &error))?;
         let mut table = Table::new(&["point", "from", "to", "largest", "mean", "lost", "way back"]);
@@ -137,13 +139,18 @@ impl SocketVerb {
         Ok(Report::new(json, format!("{table}{}", lines(&[("size", of_size)]))))
     }
 
-    /// Returns the number of samples over a capture that plays for `seconds`; over a still as over one second.
-    fn samples(&self, seconds: f32) -> Result<usize, Failure> {
+    /// Returns the number of samples over a capture that plays for `seconds`, in which other sockets have taken some;
+    /// over a still as over one second.
+    fn samples(&self, seconds: f32, taken: usize) -> Result<usize, Failure> {
         let seconds = if seconds > 0.0 { f64::from(seconds) } else { 1.0 };
         let rate = self.rate.unwrap_or(RATE);
         let count = (seconds * f64::from(rate)).ceil() + 1.0;
-        if count >= Socket::MOST_SAMPLES as f64 {
-            let many = format!("{count} samples are more than the {} of a capture", Socket::MOST_SAMPLES - 1);
+        let left = Socket::MOST_SAMPLES.saturating_sub(taken + 1);
+        if count > left as f64 {
+            let many = match taken {
+                0 => format!("{count} samples are more than the {left} of a capture"),
+                _ => format!("{count} samples are more than the {left} that its other sockets leave"),
+            };
             return Err(Failure::about(&self.scene, &format!("--rate {rate}: {many}: give a lower one")));
         }
         Ok((count as usize).max(2))

@@ -28,14 +28,16 @@ impl<S: Borrow<RuntimeScene>> FileUpload<S> {
     /// Takes pages for a file of this number, which replaces the one that is there.
     ///
     /// # Errors
-    /// When the capture has no [pages](GpuCapture::open_pages), or [too few](GpuCapture::has_room), or the scene is not a
-    /// file of the capture.
+    /// When the capture has no [pages](GpuCapture::open_pages), or the scene is not a file of the capture: the file that
+    /// was there stays. When it has [too few](GpuCapture::has_room) pages: the file that was there is removed.
     pub fn new(capture: &mut GpuCapture, file: usize, scene: S) -> Result<Self, GpuError> {
-        capture.remove_file(file);
-        let paged = capture.pages.as_mut().ok_or(GpuError::Scene("its index has no pages for it"))?;
+        let no_pages = GpuError::Scene("its index has no pages for it");
+        let Some(paged) = &capture.pages else { return Err(no_pages) };
         let own = scene.borrow();
         paged.check(file, own)?;
         let filter = own.filter.as_ref().map(|filter| paged.converted(filter)).transpose()?.flatten();
+        capture.remove_file(file);
+        let Some(paged) = &mut capture.pages else { return Err(no_pages) };
         if !paged.place(file, own.len(), filter.as_ref().or(own.filter.as_ref())) {
             return Err(GpuError::Scene("too few pages are free for it"));
         }

@@ -239,7 +239,7 @@ impl GpuCapture {
     /// Replaces the temporal filter, for clients that change the Gaussians. `interval` is the time interval of the capture.
     ///
     /// # Errors
-    /// When the filter has another number of Gaussians.
+    /// When the filter is not one of as many Gaussians.
     pub fn replace_filter(
         &mut self,
         device: &wgpu::Device,
@@ -248,9 +248,7 @@ impl GpuCapture {
         filter: &TemporalFilter,
         interval: [f32; 2],
     ) -> Result<(), GpuError> {
-        if filter.count != self.len {
-            return Err(GpuError::Scene("the temporal filter has another number of Gaussians"));
-        }
+        filter.check(self.len).map_err(GpuError::Scene)?;
         for sets in self.allocate_filter(renderer.allocator(device), renderer, filter, interval) {
             sets.fill_filter(queue, filter);
         }
