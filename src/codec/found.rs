@@ -29,7 +29,7 @@ pub(super) struct Found<'p> {
     /// Its bytes.
     pub input: Input,
     /// Its path, or its name in the archive.
-    name: PathBuf,
+    pub name: PathBuf,
     /// The other files of its folder.
     others: Others<'p>,
     /// Whether it is in an archive.

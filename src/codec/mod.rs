@@ -4,8 +4,8 @@
 //! `format` is the table of formats: [`checkpoint`] reads the files of the 4DGS trainer (`.pth`), of gsplat and of
 //! nerfstudio, [`package`] reads and writes the format of this crate (`.gs4d`), `import` reads those of other makes.
 //! `found` finds the capture of a file, which may be inside of gzip or of a zip archive; `looks` says what a file is
-//! that is no capture. `edits` reads a list of edits, [`sound`] what is heard beside a capture. [`stream`] says which
-//! files of a capture in chunk files are fetched next.
+//! that is no capture, `own_files` which files a capture has. `edits` reads a list of edits, [`sound`] what is heard
+//! beside a capture. [`stream`] says which files of a capture in chunk files are fetched next.
 
 pub(crate) mod budget;
 pub mod checkpoint;
@@ -23,6 +23,7 @@ mod loading;
 pub(crate) mod looks;
 pub(crate) mod npy;
 pub(crate) mod options;
+mod own_files;
 pub mod package;
 pub(crate) mod pickle;
 pub mod sound;
@@ -36,6 +37,7 @@ pub use error::{CodecError, CodecErrorKind};
 pub use import::ImportError;
 pub use loading::Loading;
 pub use options::{InvalidOption, ReadOptions};
+pub use own_files::files_of;
 
 use crate::scene::GaussianScene;
 use format::FORMATS;
@@ -43,7 +45,7 @@ pub use format::Format;
 use format::Read;
 use found::Found;
 use import::Imported;
-use import::source::{InFolder, InMemory};
+use import::source::{InFolder, InMemory, Others};
 use import::{sequence, sog};
 use input::Input;
 use package::{PackageInfo, WriteSettings};
@@ -75,7 +77,7 @@ pub fn load(path: &Path, options: &ReadOptions) -> Result<GaussianScene, CodecEr
 /// # Errors
 /// As [`load`].
 pub(crate) fn load_stating(path: &Path, options: &ReadOptions) -> Result<Imported, CodecError> {
-    let read = || match open(path)? {
+    let read = || match open(path, in_folder)? {
         Opened::File(mut found) => found.read(options),
         Opened::Folder(Format { read: Read::Folder(read), .. }) => Ok(read(path, options)?),
         Opened::Folder(_) => Err(CodecErrorKind::UnknownFormat(format::unknown_folder())),
@@ -111,7 +113,7 @@ pub(crate) fn read_frames(frames: Vec<(String, Vec<u8>)>, options: &ReadOptions)
 /// # Errors
 /// A file that cannot be opened, is of an unknown format, or has a damaged header.
 pub fn inspect(path: &Path) -> Result<(Format, Option<PackageInfo>), CodecError> {
-    let inspect = || match open(path)? {
+    let inspect = || match open(path, in_folder)? {
         Opened::Folder(format) => Ok((format, None)),
         Opened::File(Found { format, input, .. }) => {
             Ok((format, format.inspect.map(|inspect| inspect(input)).transpose()?))
@@ -120,17 +122,22 @@ pub fn inspect(path: &Path) -> Result<(Format, Option<PackageInfo>), CodecError>
     inspect().map_err(|kind: CodecErrorKind| CodecError::at(path, kind))
 }
 
-/// Returns the file at a path, or the format of the folder there.
-fn open(path: &Path) -> Result<Opened<'_>, CodecErrorKind> {
+/// Returns the files of a folder.
+fn in_folder(folder: &Path) -> Others<'_> {
+    Box::new(InFolder(folder))
+}
+
+/// Returns the file at a path, or the format of the folder there. `others` returns the files of a folder.
+fn open<'p>(path: &'p Path, others: impl FnOnce(&'p Path) -> Others<'p>) -> Result<Opened<'p>, CodecErrorKind> {
     if !path.is_dir() {
         let folder = path.parent().unwrap_or(Path::new(""));
-        return Ok(Opened::File(Found::of(Input::open(path)?, path, Box::new(InFolder(folder)))?));
+        return Ok(Opened::File(Found::of(Input::open(path)?, path, others(folder))?));
     }
     let start = Start::of_folder(path)?;
     if let Some(main) = sog::main_file(&start).map(|name| path.join(name)) {
         let mut input = Input::open(&main)?;
         if sog::is_of(&Start::of(&mut input, &main)?) {
-            return Ok(Opened::File(Found::of(input, &main, Box::new(InFolder(path)))?));
+            return Ok(Opened::File(Found::of(input, &main, others(path))?));
         }
     }
     let format = Format::of(&start).ok_or_else(|| CodecErrorKind::UnknownFormat(format::unknown_folder()))?;

@@ -147,7 +147,7 @@ impl FineTune {
             ImageRoom::of_system(),
             progress,
         )?;
-        let key = Key::of_files(&[&self.input])?
+        let key = Key::of_scene(&self.input)?
             .with(Key::of_images(&splits.train, progress)?)
             .with(Key::of_images(&splits.validation, progress)?)
             .with(Key::of_views(&splits.train))

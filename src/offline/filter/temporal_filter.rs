@@ -98,7 +98,7 @@ pub(crate) fn label(
 ) -> Result<Label, FilterError> {
     let read = format!("{:?} {:?}", scene.trained_with, scene.playback);
     Ok(Label::new("mask", shard)
-        .with("scene", Key::of_file(input)?)
+        .with("scene", Key::of_scene(input)?)
         .with("reading of the scene", Key::of(read.as_bytes()))
         .with("filter", filter_name(kind))
         .with("number of key-frames", keys)

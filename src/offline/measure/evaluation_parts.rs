@@ -83,7 +83,7 @@ impl Subject<'_> {
         let Self { scene, views, background, metrics, .. } = self;
         let read = format!("{:?} {:?} {background:?}", scene.trained_with, scene.playback);
         Ok(Label::new("eval", shard)
-            .with("scene", Key::of_file(self.input)?)
+            .with("scene", Key::of_scene(self.input)?)
             .with("reading of the scene", Key::of(read.as_bytes()))
             .with("use of the filter", scene.filter.is_some())
             .with("set of views", Key::of_views(views))

@@ -33,7 +33,7 @@ pub(crate) fn label(
     let ScoringSettings { views: count, score } = settings;
     let read = format!("{:?} {:?} {background:?}", scene.trained_with, scene.playback);
     Ok(Label::new("score", shard)
-        .with("checkpoint", Key::of_file(checkpoint)?)
+        .with("checkpoint", Key::of_scene(checkpoint)?)
         .with("reading of the checkpoint", Key::of(read.as_bytes()))
         .with("set of training views", Key::of_views(views))
         .with("number of views", count.map_or("all".to_owned(), |count| count.to_string()))

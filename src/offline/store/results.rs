@@ -5,7 +5,7 @@
 //! number of runs of single stages, of which one at a time works on a stage.
 
 use super::StoreError;
-use crate::codec::CodecError;
+use crate::codec::{CodecError, files_of};
 use crate::offline::dataset::{Correction, TrainingView};
 use crate::offline::work::node::node;
 use crate::offline::work::{FileError, Progress, proceed, temporary_file, unfinished, write_beside};
@@ -70,6 +70,15 @@ impl Key {
     pub fn of_files(paths: &[&Path]) -> Result<Self, StoreError> {
         let hashes: Vec<Self> = paths.par_iter().map(|path| Self::of_file(path)).collect::<Result<_, _>>()?;
         Ok(hashes.into_iter().fold(Self::of(b"files"), Self::with))
+    }
+
+    /// Returns the key of the contents of a capture: of all files that it is read from.
+    ///
+    /// # Errors
+    /// The first file that cannot be read, by name.
+    pub fn of_scene(path: &Path) -> Result<Self, StoreError> {
+        let files = files_of(path);
+        Self::of_files(&files.iter().map(PathBuf::as_path).collect::<Vec<_>>())
     }
 
     /// Returns the key of the contents of the images and masks of these views; the absence of a file counts too. Begins
@@ -446,6 +455,31 @@ mod tests {
         drop(second);
         assert!(!out.with_file_name("scene.gs4d.bake").exists(), "the last run removes an empty folder");
         Store::beside(&out, ".bake").expect("nobody works in it");
+    }
+
+    #[test]
+    fn the_key_of_a_capture_depends_on_the_files_that_it_names() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let at = |name: &str| folder.path().join(name);
+        let write = |name: &str, bytes: &str| fs::write(at(name), bytes).expect("the folder can be written to");
+        let means = r#"{"mins": [0, 0, 0], "maxs": [1, 1, 1], "files": ["means_l.webp", "means_u.webp"]}"#;
+        let others = ["scales", "quats", "sh0"].map(|name| {
+            let codebook = vec!["0"; 256].join(", ");
+            format!(r#""{name}": {{"codebook": [{codebook}], "files": ["{name}.webp"]}}"#)
+        });
+        let meta = format!(r#"{{"version": 2, "count": 1, "means": {means}, {}}}"#, others.join(", "));
+        write("meta.json", &meta);
+        for name in ["means_l", "means_u", "scales", "quats", "sh0", "another"] {
+            write(&format!("{name}.webp"), name);
+        }
+        let keys = || [folder.path().to_owned(), at("meta.json")].map(|path| Key::of_scene(&path).expect("a capture"));
+        let [of_folder, of_file] = keys();
+        assert_eq!(of_folder, of_file, "the folder is that file");
+        write("another.webp", "changed");
+        assert_eq!(keys(), [of_file; 2], "a file that it does not name");
+        write("means_l.webp", "changed");
+        assert_ne!(keys()[0], of_file, "a texture");
+        assert_ne!(keys()[1], of_file, "a texture");
     }
 
     #[test]
