@@ -4,7 +4,7 @@
 //! option that contradicts the stored Gaussians.
 
 use crate::codec::options::{InvalidOption, ReadOptions};
-use crate::scene::GaussianScene;
+use crate::scene::{FilterKind, GaussianScene, TemporalFilter};
 
 /// Replaces the stored settings by the options that are given.
 ///
@@ -26,11 +26,28 @@ pub(super) fn apply(options: &ReadOptions, scene: &mut GaussianScene) -> Result<
     stored.background = options.background.unwrap_or(stored.background);
     stored.raster_fov = options.raster_fov.unwrap_or(stored.raster_fov);
     stored.cameras = options.cameras.unwrap_or(stored.cameras);
-    stored.marginal_cutoff = options.marginal_cutoff.unwrap_or(stored.marginal_cutoff);
+    let cutoff = stored.marginal_cutoff;
+    stored.marginal_cutoff = options.marginal_cutoff.unwrap_or(cutoff);
     stored.sh_direction = options.sh_direction.unwrap_or(stored.sh_direction);
     scene.playback.up = options.up.unwrap_or(scene.playback.up);
     scene.playback.duration_seconds = options.duration_seconds.unwrap_or(scene.playback.duration_seconds);
+    if scene.trained_with.marginal_cutoff != cutoff {
+        renew_support(scene);
+    }
     Ok(())
+}
+
+/// Computes a support filter again: it follows from the cut-off, and that of a higher one would hide Gaussians.
+fn renew_support(scene: &mut GaussianScene) {
+    let Some(TemporalFilter { segments, .. }) = scene.filter.take_if(|filter| filter.kind == FilterKind::Support)
+    else {
+        return;
+    };
+    let (interval, cutoff) = (scene.trained_with.time_interval, scene.trained_with.marginal_cutoff);
+    // A scene with a Gaussian that cannot be drawn is refused wherever it is drawn, with a filter or without.
+    let gaussians = scene.gaussians().ok();
+    let filter = gaussians.map(|all| TemporalFilter::support(all.iter().copied(), interval, cutoff, segments));
+    scene.filter = filter;
 }
 
 #[cfg(test)]
@@ -70,6 +87,30 @@ mod tests {
         let mut same = scene();
         apply(&ReadOptions::default(), &mut same).expect("no option is given");
         assert_eq!(same, scene(), "without options the scene is unchanged");
+    }
+
+    #[test]
+    fn another_cutoff_changes_the_support_filter_alone() {
+        let whole = synthesize(&SynthSettings { count: 200, ..SynthSettings::default() });
+        let interval = whole.trained_with.time_interval;
+        let support = |cutoff: f32| {
+            let gaussians = whole.gaussians().expect("a synthetic scene can be drawn").into_owned();
+            Some(TemporalFilter::support(gaussians.into_iter(), interval, cutoff, 20))
+        };
+        let (before, longer) = (support(whole.trained_with.marginal_cutoff), support(0.01));
+        assert_ne!(before, longer, "a lower cut-off makes lifespans longer");
+        let filter_at = |cutoff: f32, filter: &Option<TemporalFilter>| {
+            let mut scene = GaussianScene { filter: filter.clone(), ..whole.clone() };
+            let options = ReadOptions { marginal_cutoff: Some(cutoff), ..ReadOptions::default() };
+            apply(&options, &mut scene).expect("no option contradicts the scene");
+            assert_eq!(scene.trained_with.marginal_cutoff, cutoff, "the cut-off is replaced");
+            scene.filter
+        };
+        assert_eq!(filter_at(0.01, &before), longer, "the filter of the lower cut-off");
+        assert_eq!(filter_at(whole.trained_with.marginal_cutoff, &before), before, "the same cut-off");
+        let other = before.clone().map(|filter| TemporalFilter { kind: FilterKind::Interval, ..filter });
+        assert_eq!(filter_at(0.01, &other), other, "a filter that was computed from views");
+        assert_eq!(filter_at(0.01, &None), None, "no filter");
     }
 
     #[test]
