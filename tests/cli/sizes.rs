@@ -2,7 +2,7 @@
 //!
 //! In: a small scene, a dataset of it, sizes of 16384x16384 pixels, a limit on the address space that a shell sets.
 //! Out: proof that each verb refuses them at once, with the need, the limit and the option that makes pictures smaller,
-//! and writes no file.
+//! and writes no file; and that so many views are refused, too.
 
 use crate::support::capture::Capture;
 use crate::support::command::{GS4D, Run, arguments, gs4d, has_gpu};
@@ -120,4 +120,11 @@ fn frames_that_do_not_fit_the_gpu_are_refused_before_they_are_timed() {
     let run = gs4d(&arguments!["bench", &capture.scene, "--size", "16384x16384"]);
     run.must_fail("--size makes pictures smaller");
     assert!(start.elapsed() < AT_ONCE, "refused at once: {:?}", start.elapsed());
+}
+
+#[test]
+fn more_views_than_frames_that_can_be_measured_are_refused() {
+    let capture = capture();
+    let run = gs4d(&arguments!["bench", &capture.scene, "--orbit", "100000", "--times", "11"]);
+    run.must_fail("100000 views at 11 times are more than 1000000 pictures: give fewer --times");
 }

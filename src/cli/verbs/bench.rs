@@ -81,6 +81,8 @@ enum Form {
 const FORMS: [(&str, Form); 2] = [("stored", Form::Stored), ("fp32", Form::Unpacked)];
 const SWITCH: [(&str, bool); 2] = [("on", true), ("off", false)];
 
+/// Most views, each at a time: as many as the most frames that are measured.
+const MOST_VIEWS: usize = 1_000_000;
 /// Number of views in which the splats of each pixel are counted, on the CPU.
 const COUNTED_VIEWS: usize = 3;
 
@@ -184,6 +186,11 @@ impl Bench {
         let scene = scene.into_runtime().map_err(|error| Failure::at(path, &error))?;
         let mut shots = share(self.views.shots(&scene, self.count)?, self.views.limit(self.count));
         if let Some(times) = self.times {
+            let count = shots.len();
+            if count.saturating_mul(times) > MOST_VIEWS {
+                let views = format!("{count} views at {times} times are more than {MOST_VIEWS} pictures");
+                return Err(Failure::new(format!("{views}: give fewer --times, --orbit or --views")));
+            }
             shots = at_times(shots, times, scene.trained_with.time_interval);
         }
         let views = shots.iter().map(|shot| shot.view(&scene)).collect();

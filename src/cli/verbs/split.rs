@@ -13,7 +13,9 @@ use crate::cli::output::report::Report;
 use crate::cli::output::table::{Table, bytes, lines};
 use crate::offline::measure::belonging::require_belonging;
 use crate::offline::measure::reference_pictures::ReferencePictures;
-use crate::offline::segments::{Chunk, Chunks, Cut, LayerShares, Segment, Split, other_chunks, sound_path};
+use crate::offline::segments::{
+    Chunk, Chunks, Cut, LayerShares, Segment, Split, other_chunks, require_own_sound, sound_path,
+};
 use crate::offline::store::outputs::Files;
 use crate::offline::work::{Progress, proceed};
 use crate::scene::{ChunkTable, Form, SceneForm};
@@ -79,7 +81,7 @@ impl SplitVerb {
     ///
     /// # Errors
     /// A capture that cannot be read, or is packed and was not cut when it was compressed; chunks of another capture in the
-    /// folder, files that cannot be written; views that cannot be used, a failure of the engine.
+    /// folder, or a sound of none; files that cannot be written; views that cannot be used, a failure of the engine.
     pub(crate) fn run(&self) -> Result<Report, Failure> {
         self.given.require(Need::MeasuredLayers, self.data.is_given())?;
         self.engine.check(&self.given)?;
@@ -113,7 +115,9 @@ impl SplitVerb {
                           folder";
             return Err(Failure::about(other, reason));
         }
-        let sound = segment.scene.sound.as_deref().map(|sound| sound_path(&self.out, sound));
+        let sound = segment.scene.sound.as_deref();
+        require_own_sound(&self.out, sound)?;
+        let sound = sound.map(|sound| sound_path(&self.out, sound));
         files.writes_folder(&self.out, paths.into_iter().chain([index]).chain(sound)).check()?;
         let psnrs = self.measured(&segment, &split)?;
         fs::create_dir_all(&self.out).map_err(|error| Failure::at(&self.out, &error))?;

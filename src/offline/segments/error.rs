@@ -158,6 +158,15 @@ pub enum SegmentsError {
         /// The capture.
         path: PathBuf,
     },
+    /// A sound where that of a capture in chunk files belongs, and that is of no such capture.
+    #[error(
+        "{}: is a sound without the index of a capture, and players would play it with the chunk files: move it away, or \
+         write to another folder", .path.display()
+    )]
+    OtherSound {
+        /// The sound.
+        path: PathBuf,
+    },
     /// A chunk that is not there.
     #[error("{}: its chunk {name} is missing: all chunks of a capture are needed", .folder.display())]
     Missing {

@@ -42,6 +42,7 @@ pub use join::{Joined, JoinedSegment, Times, join};
 pub use layers::LayerShares;
 pub(crate) use parts::{LEAST_PACKED, lives, parts};
 pub use segment::Segment;
-pub use sound_beside::{sound_beside, sound_path};
+pub(crate) use sound_beside::remove_index;
+pub use sound_beside::{require_own_sound, sound_beside, sound_path};
 pub use split::{Chunk, Chunks, Split, other_chunks};
 pub use unite::unite;

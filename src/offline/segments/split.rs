@@ -10,14 +10,13 @@ use super::files::chunks_in;
 use super::layers::LayerShares;
 use super::parts::{LEAST, lives, parts};
 use super::segment::Segment;
-use super::sound_beside::write_sound;
+use super::sound_beside::{remove_index, write_sound};
 use crate::codec::package;
 use crate::offline::work::{FileError, Progress, proceed, save, save_chunk, save_one_file, write_settings};
 use crate::scene::packed::runs::Part;
 use crate::scene::{ChunkFile, ChunkTable, FilterKind, Form, GaussianScene, PackedScene, RunPart, Runs, SceneForm};
 use std::collections::HashSet;
 use std::fs;
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -124,7 +123,7 @@ impl Split {
     /// were not measured. Begins the task "writing".
     ///
     /// # Errors
-    /// Files that cannot be written, an interruption.
+    /// Files that cannot be written, a sound of no capture where that of this one belongs, an interruption.
     pub fn write(
         &self,
         segment: &Segment,
@@ -135,7 +134,7 @@ impl Split {
     ) -> Result<Chunks, SegmentsError> {
         progress.begin("writing", self.parts.len() + 1);
         let (index, settings) = (folder.join(ChunkTable::INDEX), write_settings(&segment.scene.form, level));
-        remove_index(&index)?;
+        remove_index(folder, segment.scene.sound.as_deref())?;
         let mut files = Vec::with_capacity(self.parts.len());
         for (part, path) in self.parts.iter().zip(self.paths(folder)) {
             proceed(progress)?;
@@ -243,14 +242,6 @@ fn utilities(psnrs: &[f64], files: impl Iterator<Item = ChunkFile> + Clone) -> V
     let bytes = |layer: u32| files.clone().filter(|file| file.layer == layer).map(|file| file.bytes).sum::<u64>();
     let gains = psnrs.windows(2).map(|pair| pair[1] - pair[0]);
     (0..).zip(gains).map(|(layer, gain)| (gain * 1e6 / bytes(layer).max(1) as f64) as f32).collect()
-}
-
-/// Removes the index of an earlier split: its table is not that of the files that are written now.
-fn remove_index(index: &Path) -> Result<(), FileError> {
-    match fs::remove_file(index) {
-        Err(error) if error.kind() != ErrorKind::NotFound => Err(FileError::at(index, error)),
-        _ => Ok(()),
-    }
 }
 
 /// Returns the chunk files in a folder that are none of these files: they would be read with them. None if there is no
