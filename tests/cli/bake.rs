@@ -231,6 +231,32 @@ fn finished_stages_are_skipped() {
 }
 
 #[test]
+fn a_bake_whose_chunk_files_cannot_be_written_resumes() {
+    let scene = synthesize(&SynthSettings { count: 600, duration_seconds: 4.0, ..SynthSettings::default() });
+    let capture = capture_of(scene, Vec3::ZERO, true);
+    let out = capture.out();
+    let fixed = arguments!["bake", &capture.scene, "--data", &capture.data, "-o", &out, "--engine", "cpu", "--stream"];
+    let bake = || gs4d(&[fixed.to_vec(), arguments!["--ratio", "0.5"].to_vec()].concat());
+    bake().text();
+    let (stream, work) = (capture.path("out.stream"), capture.path("out.gs4d.bake"));
+    assert!(!work.exists(), "a bake that has written everything removes its results");
+    let chunk = stream.join(folders::names(&stream).into_iter().find(|name| name.starts_with("chunk-")).expect("one"));
+    let bytes = fs::read(&chunk).expect("the chunk file exists");
+    fs::remove_file(&chunk).expect("the chunk file exists");
+    fs::create_dir(&chunk).expect("the folder can be written to");
+    bake().must_fail("chunk-00001-of-");
+    assert!(work.is_dir(), "the results of the stages stay");
+    fs::remove_dir(&chunk).expect("the folder is empty");
+    let again = bake();
+    assert_eq!(again.code, Some(0), "the command succeeds: {}", again.err);
+    for stage in ["score", "prune", "mask", "compress"] {
+        assert!(again.err.contains(&format!("{stage}: skipped")), "{stage}: {}", again.err);
+    }
+    assert_eq!(fs::read(&chunk).ok(), Some(bytes), "the same chunk file");
+    assert!(stream.join("index.gs4d").is_file() && !work.exists(), "all is written, and the results are removed");
+}
+
+#[test]
 fn the_allowed_loss_determines_the_number_of_gaussians() {
     let capture = capture(Vec3::ZERO, true);
     let bake = |loss: &str| {

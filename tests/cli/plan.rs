@@ -121,9 +121,16 @@ fn a_plan_has_every_stage_with_what_it_needs() {
     assert_eq!(ids(&plan), trained, "and on a GPU, which need not be here");
     assert!(jobs(&plan).iter().all(|job| job["needs"]["gpu"] == true), "all need one");
     let (data, out, file) = (&capture.data, capture.path("new.gs4d"), capture.path("new.json"));
-    let plan = gs4d(&arguments!["bake", data, "-o", out, "--engine", "gpu", "--plan", file, "--json"]).json();
+    let plan = gs4d(&arguments!["bake", data, "-o", &out, "--engine", "gpu", "--plan", &file, "--json"]).json();
     assert_eq!(ids(&plan)[..2], ["train", "score"], "from pictures, a capture is trained first");
     assert_eq!(strings(&jobs(&plan)[1]["after"]), ["train"], "and then scored");
+    let bytes = |plan: &Value, job: usize| jobs(plan)[job]["needs"]["memory_bytes"].as_u64().expect("a number");
+    let mut plain = arguments!["bake", data, "-o", &out, "--engine", "gpu", "--plan", &file, "--json"].to_vec();
+    plain.push("--no-fine-tune".into());
+    let plain = gs4d(&plain).json();
+    assert_eq!(ids(&plain), ["train", "score", "prune", "mask", "compress", "report"], "without fine-tuning");
+    assert_eq!(bytes(&plain, 0), bytes(&plan, 0), "a training from pictures holds its images in any case");
+    assert!(bytes(&plain, 2) > bytes(&plain, 1), "the stage prune holds the images of the validation views");
 }
 
 #[test]
@@ -253,6 +260,19 @@ fn bad_plans_are_refused() {
     run(&["--engine", "cpu", "--plan", &data]).must_fail("is the input itself");
     let pictures = arguments!["bake", &capture.data, "-o", &out, "--engine", "cpu", "--plan", &plan];
     gs4d(&pictures).must_fail("training from pictures needs a GPU");
+    // What the jobs would refuse.
+    run(&["--engine", "cpu", "--plan", &path, "--target-size", "0.0001"]).must_fail("a package without Gaussians has");
+    let packed = capture.path("packed.gs4d");
+    gs4d(&arguments!["compress", &capture.scene, &packed]).text();
+    let of_packed =
+        arguments!["bake", &packed, "--data", &capture.data, "-o", &out, "--engine", "cpu", "--plan", &plan];
+    gs4d(&of_packed).must_fail("the scene is packed already");
+    fs::remove_file(&packed).expect("the package exists");
+    let image = capture.data.join("train/c00_01.png");
+    let bytes = fs::read(&image).expect("the image exists");
+    fs::remove_file(&image).expect("the image exists");
+    gs4d(&arguments!["bake", &capture.data, "-o", &out, "--engine", "gpu", "--plan", &plan]).must_fail("c00_01.png");
+    fs::write(&image, bytes).expect("the folder can be written to");
     for more in [["--only", "everything"], ["--shard", "0/2"], ["--shards", "0"]] {
         let refused = run(&more);
         assert_eq!(refused.code, Some(2), "{more:?}: {}", refused.err);

@@ -20,8 +20,8 @@ use crate::codec::sound::read_sound;
 use crate::offline::bake::job::{JOB_STAGES, Job, Scoring};
 use crate::offline::bake::plan::{Command, Source, plan};
 use crate::offline::bake::{
-    BakeSettings, Baked, bake, bake_job, check_pictures, chunk_folder, obstacle_to_tuning, train_dataset, trained_path,
-    wants_chunk_files, write_chunk_files,
+    BakeSettings, Baked, bake_and, bake_job, check_pictures, chunk_folder, has_chunk_files, obstacle_to_tuning,
+    train_dataset, trained_path, wants_chunk_files, write_chunk_files,
 };
 use crate::offline::collide::CollideSettings;
 use crate::offline::compress::Quality;
@@ -36,7 +36,7 @@ use crate::offline::segments::Chunks;
 use crate::offline::store::outputs::Files;
 use crate::offline::store::shard::Shard;
 use crate::offline::train::{FineTuneSettings, TrainError, TrainSettings, Usual};
-use crate::offline::work::write_beside;
+use crate::offline::work::{Progress, write_beside};
 use crate::scene::{ChunkTable, FilterKind, GaussianScene, MAX_SEGMENTS};
 use serde_json::json;
 use std::env;
@@ -313,9 +313,13 @@ impl Bake {
         if let Some((_, sound)) = &sound {
             note_length(sound, seconds);
         }
-        let Baked { report, html, .. } = bake(scene, &settings, &mut { engine }, progress)?;
-        report.warnings.iter().for_each(|warning| note(&format!("warning: {warning}")));
-        let chunks = self.chunk_files(&settings.out, [report.bytes.after, of_sound], seconds, progress)?;
+        // The results of the stages are kept until the chunk files are there, too.
+        let chunk_files = |Baked { report, .. }: &Baked, progress: &mut dyn Progress| {
+            report.warnings.iter().for_each(|warning| note(&format!("warning: {warning}")));
+            self.chunk_files(&settings.out, [report.bytes.after, of_sound], seconds, progress)
+        };
+        let (baked, chunks) = bake_and(scene, &settings, &mut { engine }, progress, chunk_files)?;
+        let Baked { report, html, .. } = baked;
         let (mut json, mut text) = (report.json()?, in_short(&report, &html));
         if let Some(chunks) = chunks {
             let Chunks { index, table, .. } = &chunks;
@@ -329,19 +333,20 @@ impl Bake {
     }
 
     /// Writes the chunk files of a package that plays for `seconds`, if they are wanted: by `--stream`, or because it is
-    /// large and there are none of an earlier package. `lengths`: the bytes of the package, and of its sound.
+    /// large and there are none of an earlier package that are complete. `lengths`: the bytes of the package, and of its
+    /// sound.
     fn chunk_files(
         &self,
         package: &Path,
         lengths: [u64; 2],
         seconds: f32,
-        progress: &mut Bars,
+        progress: &mut dyn Progress,
     ) -> Result<Option<Chunks>, Failure> {
         let (folder, [length, of_sound]) = (chunk_folder(package), lengths);
         match self.stream {
             Some(true) => Ok(Some(write_chunk_files(package, progress)?)),
             // Nothing is replaced that the command does not name.
-            None if wants_chunk_files(length.saturating_sub(of_sound), seconds) && !folder.exists() => {
+            None if wants_chunk_files(length.saturating_sub(of_sound), seconds) && !has_chunk_files(package) => {
                 let (folder, length) = (folder.display(), bytes(length));
                 note(&format!("note: the package has {length}: {folder} has it in chunk files (--stream=off: none)"));
                 // The package is there: files that cannot be written do not fail the bake.
@@ -355,10 +360,12 @@ impl Bake {
                 }
             }
             Some(false) | None => {
-                let index = folder.join(ChunkTable::INDEX);
-                if index.exists() {
-                    let index = index.display();
-                    note(&format!("note: {index} is that of an earlier package: --stream replaces its files"));
+                if has_chunk_files(package) {
+                    let index = folder.join(ChunkTable::INDEX);
+                    note(&format!(
+                        "note: {} is that of an earlier package: --stream replaces its files",
+                        index.display()
+                    ));
                 }
                 Ok(None)
             }
@@ -389,12 +396,10 @@ impl Bake {
                 return Err(TrainError::WithoutGpu.into());
             }
             let training = self.training(settings, usual);
-            let source = Source::Pictures(training.start.gaussians, training.tuning.steps);
-            plan(source, settings, gpu, shards, directory, &command, progress)?
+            plan(Source::Pictures(&training), settings, gpu, shards, directory, &command, progress)?
         } else {
-            let scene = self.checkpoint.load_to_change(&self.input)?;
-            let source = Source::Scene(scene.len(), &scene.form, &scene.trained_with);
-            plan(source, settings, gpu, shards, directory, &command, progress)?
+            let scene = Source::Scene(Box::new(self.load(settings, progress)?));
+            plan(scene, settings, gpu, shards, directory, &command, progress)?
         };
         let json = serde_json::to_value(&plan)?;
         let text = format!("{json:#}\n");

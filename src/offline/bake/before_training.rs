@@ -1,7 +1,7 @@
 //! What can be refused before the training from pictures that precedes a bake.
 //!
-//! In: the settings of both, an engine. Out: the error of the training, or of a stage after it, that would fail because
-//! of the settings, the engine, the cameras and the paths alone.
+//! In: the settings of both, perhaps an engine. Out: the error of the training, or of a stage after it, that would fail
+//! because of the settings, the engine, the cameras and the paths alone; the views.
 
 use super::BakeError;
 use super::ahead::check;
@@ -29,13 +29,27 @@ pub(crate) fn check_pictures(
     if let Engine::Cpu = engine {
         return Err(TrainError::WithoutGpu.into());
     }
+    let Divided { splits, views, .. } = divided(settings, training, progress)?;
+    check(settings, &splits, &views, engine)
+}
+
+/// Returns the views of such a bake, after the checks that do not depend on the machine.
+///
+/// # Errors
+/// The first fault of the settings, the paths or the views.
+pub(super) fn divided(
+    settings: &BakeSettings,
+    training: &TrainSettings,
+    progress: &mut dyn Progress,
+) -> Result<Divided, BakeError> {
     settings.check_files()?;
     Files::default().reads_data(&settings.data).writes_regular(&settings.checkpoint, "gs4d").check()?;
-    let Divided { splits, views, trained_with, playback } = training.divide(progress)?;
-    require_images(&splits.validation)?;
-    check(settings, &splits, &views, engine)?;
+    let divided = training.divide(progress)?;
+    require_images(&divided.splits.validation)?;
     // The smallest package has no Gaussians and no environment map.
     let one = synthesize(&SynthSettings { count: 1, ..SynthSettings::default() });
+    let (trained_with, playback) = (divided.trained_with.clone(), divided.playback);
     let scene = GaussianScene { trained_with, playback, sound: settings.sound()?, ..one };
-    require_least(&scene, settings, key_frames(settings, &views), settings.fine_tune.is_some())
+    require_least(&scene, settings, key_frames(settings, &divided.views), settings.fine_tune.is_some())?;
+    Ok(divided)
 }

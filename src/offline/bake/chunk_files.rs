@@ -6,7 +6,7 @@
 use super::BakeError;
 use crate::codec::{self, ReadOptions};
 use crate::offline::compress::{PackedOrder, reorder};
-use crate::offline::segments::{Chunks, Cut, LayerShares, Segment, Split, other_chunks};
+use crate::offline::segments::{Chunks, Cut, LayerShares, Segment, Split, other_chunks, remove_index};
 use crate::offline::store::results::CHUNKS;
 use crate::offline::work::{FileError, Progress};
 use crate::scene::{ChunkTable, Form, GaussianScene, PackedScene, SceneForm};
@@ -30,6 +30,11 @@ pub fn chunk_folder(package: &Path) -> PathBuf {
     package.with_extension(CHUNKS)
 }
 
+/// Returns whether a package has all its chunk files: their index is written last.
+pub fn has_chunk_files(package: &Path) -> bool {
+    chunk_folder(package).join(ChunkTable::INDEX).exists()
+}
+
 /// Writes the chunk files of a package, whose Gaussians are first brought into their order if they are packed in
 /// another one. Those of an earlier package in the same folder are removed, their index first. Begins the task
 /// "writing".
@@ -49,18 +54,18 @@ pub fn write_chunk_files(package: &Path, progress: &mut dyn Progress) -> Result<
         }
     };
     fs::create_dir_all(&folder).map_err(|error| FileError::at(&folder, error))?;
+    remove_index(&folder, segment.scene.sound.as_deref())?;
     remove_earlier(&folder, &split)?;
     Ok(split.write(&segment, &folder, None, &[], progress)?)
 }
 
-/// Removes the index and the chunk files of an earlier package, but for those that will be written.
+/// Removes the chunk files of an earlier package, but for those that will be written.
 fn remove_earlier(folder: &Path, split: &Split) -> Result<(), FileError> {
-    let remove = |path: &Path| match fs::remove_file(path) {
+    let remove = |path: &PathBuf| match fs::remove_file(path) {
         Err(error) if error.kind() != ErrorKind::NotFound => Err(FileError::at(path, error)),
         _ => Ok(()),
     };
-    remove(&folder.join(ChunkTable::INDEX))?;
-    other_chunks(folder, &split.paths(folder)).iter().try_for_each(|other| remove(other))
+    other_chunks(folder, &split.paths(folder)).iter().try_for_each(remove)
 }
 
 /// Returns how the capture is cut: its first layers are small, so that the first picture is soon there.
@@ -93,6 +98,19 @@ mod tests {
         assert!(wants_chunk_files(7_150_000, 60.0), "a take of a minute");
         assert!(!wants_chunk_files(2_500_000, 4.0), "a small capture");
         assert!(!wants_chunk_files(50_000_000, 0.0), "a still");
+    }
+
+    #[test]
+    fn chunk_files_without_an_index_are_those_of_a_bake_that_failed() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let package = folder.path().join("take.gs4d");
+        assert!(!has_chunk_files(&package), "no folder");
+        let chunks = chunk_folder(&package);
+        fs::create_dir(&chunks).expect("the folder can be made");
+        fs::write(chunks.join(ChunkTable::file_name(0, 3)), b"").expect("the folder can be written to");
+        assert!(!has_chunk_files(&package), "one of three chunk files, which the next bake writes again");
+        fs::write(chunks.join(ChunkTable::INDEX), b"").expect("the folder can be written to");
+        assert!(has_chunk_files(&package), "the index is written last");
     }
 
     #[test]

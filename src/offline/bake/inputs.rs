@@ -7,6 +7,7 @@ use super::BakeError;
 use super::ahead::check;
 use super::job::{Job, Scoring};
 use super::settings::BakeSettings;
+use crate::offline::compress::require_unpacked;
 use crate::offline::dataset::TrainingView;
 use crate::offline::dataset::splits::Splits;
 use crate::offline::dataset::trained_pixel;
@@ -17,7 +18,7 @@ use crate::offline::measure::belonging::require_belonging;
 use crate::offline::prune::search::Goal;
 use crate::offline::store::results::{BAKE_FOLDER, Key, Store};
 use crate::offline::train::{FineTuneSettings, ImageRoom, TrainingImages, untrainable::obstacle};
-use crate::offline::work::Progress;
+use crate::offline::work::{FileError, Progress};
 use crate::scene::{GaussianScene, MAX_SEGMENTS};
 use std::sync::Arc;
 
@@ -41,7 +42,7 @@ pub(super) struct Inputs<'a> {
 }
 
 impl<'a> Inputs<'a> {
-    /// Reads the dataset and checks it against the scene.
+    /// Reads the dataset and checks it against the scene, which [`bakeable`] returned.
     ///
     /// # Errors
     /// Views or images that cannot be used, another bake to the same package, a failure of the engine.
@@ -57,17 +58,13 @@ impl<'a> Inputs<'a> {
             Some(_) => Store::shared(&settings.out, BAKE_FOLDER)?,
             None => Store::beside(&settings.out, BAKE_FOLDER)?,
         };
-        scene.sound = settings.sound()?.or(scene.sound);
-        require_no_windows(scene.filter.as_ref(), "a bake")?;
-        scene.filter = None;
-        scene.levels.clear();
         let splits = Splits::open(data, options, &scene.trained_with, progress)?;
         progress.note(&splits.to_string());
         let views = splits.all_training(&scene.trained_with, progress)?;
         check(settings, &splits, &views, engine)?;
         scene.trained_with.validation = Some(splits.to_string());
         let read = format!("{:?} {:?} {:?}", scene.trained_with, scene.playback, settings.background);
-        let scene_key = Key::of_files(&[checkpoint])?.and(env!("CARGO_PKG_VERSION")).and(&read);
+        let scene_key = Key::of_scene(checkpoint)?.and(env!("CARGO_PKG_VERSION")).and(&read);
         // How many Gaussians fit into a package of a given size depends on its other parts.
         let sound = scene.sound.as_ref().filter(|_| matches!(settings.goal, Goal::Size(_)));
         let scene_key = sound.map_or(scene_key, |sound| scene_key.with(Key::of(sound.bytes())));
@@ -137,6 +134,20 @@ impl<'a> Inputs<'a> {
             Goal::Keep(_) | Goal::Remove(_) | Goal::MaxLoss(_) => u64::MAX,
         }
     }
+}
+
+/// Returns a scene with the sound of its package, and without what the bake makes anew: its temporal filter and its
+/// levels of detail.
+///
+/// # Errors
+/// A scene that is packed already or has windows of time, a sound that cannot be read.
+pub(super) fn bakeable(mut scene: GaussianScene, settings: &BakeSettings) -> Result<GaussianScene, BakeError> {
+    require_unpacked(&scene.form).map_err(|error| FileError::at(&settings.checkpoint, error))?;
+    require_no_windows(scene.filter.as_ref(), "a bake")?;
+    scene.sound = settings.sound()?.or(scene.sound);
+    scene.filter = None;
+    scene.levels.clear();
+    Ok(scene)
 }
 
 /// Returns the number of key-frames of the filter, given every training view.

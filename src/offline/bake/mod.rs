@@ -5,8 +5,8 @@
 //! stages.
 //!
 //! All stages before the evaluation store their results in the folder `OUT.bake` next to a package `OUT`, so that an
-//! interrupted bake resumes. Two bakes cannot use one folder at the same time; the jobs of a `plan`, which are single
-//! stages, can.
+//! interrupted bake resumes; they are removed once everything is written. Two bakes cannot use one folder at the same
+//! time; the jobs of a `plan`, which are single stages, can.
 //!
 //! Every choice (score, count, step) depends on the validation views alone, which are not trained on; test views are
 //! drawn for the report, after the last choice.
@@ -20,7 +20,7 @@
 //! | `rounds`, `tuning` | rounds and fine-tune: gradual pruning, and training the remaining Gaussians |
 //! | `compression`, `size`, `package_size` | mask and compress, and how many Gaussians fit into a package |
 //! | `test_comparison`, `summary` | evaluate and report |
-//! | `chunk_files` | the package in chunk files, once the bake has ended |
+//! | `chunk_files` | the package in chunk files |
 //! | `job`, `plan` | single stages as jobs for many machines |
 
 mod ahead;
@@ -45,26 +45,25 @@ mod tuning;
 
 pub(crate) use ahead::obstacle_to_tuning;
 pub(crate) use before_training::check_pictures;
-pub use chunk_files::{chunk_folder, wants_chunk_files, write_chunk_files};
+pub use chunk_files::{chunk_folder, has_chunk_files, wants_chunk_files, write_chunk_files};
 pub use error::BakeError;
 pub use settings::BakeSettings;
 pub use train_stage::{train_dataset, trained_path};
 
 use crate::gaussian::Gaussian;
-use crate::offline::compress::require_unpacked;
 use crate::offline::engine::Engine;
 use crate::offline::prune::PruneError;
 use crate::offline::prune::search::of_name;
 use crate::offline::prune::select::highest;
 use crate::offline::report::{BakeReport, write_with_report};
 use crate::offline::store::StoreError;
-use crate::offline::store::results::Key;
+use crate::offline::store::results::{Key, Store};
 use crate::offline::store::stages::Stages;
-use crate::offline::work::{FileError, Progress};
+use crate::offline::work::Progress;
 use crate::scene::{GaussianScene, TemporalFilter};
 use choice::{Choice, choose, score};
 use compression::{compress, mask};
-use inputs::Inputs;
+use inputs::{Inputs, bakeable};
 use job::Job;
 use rounds::thin;
 use size::{Attempts, require_room};
@@ -102,11 +101,30 @@ pub fn bake(
     engine: &mut Engine,
     progress: &mut dyn Progress,
 ) -> Result<Baked, BakeError> {
-    match stages_of(scene, settings, None, engine, progress)? {
-        Some(baked) => Ok(baked),
+    bake_and(scene, settings, engine, progress, |_, _| Ok(())).map(|(baked, ())| baked)
+}
+
+/// Runs a bake as [`bake`], and then `last`, which writes what else belongs to it. The stored results are removed only
+/// after that, so that a bake whose last part fails or is interrupted resumes, too.
+///
+/// # Errors
+/// As [`bake`], and those of `last`.
+pub(crate) fn bake_and<T, E: From<BakeError>>(
+    scene: GaussianScene,
+    settings: &BakeSettings,
+    engine: &mut Engine,
+    progress: &mut dyn Progress,
+    last: impl FnOnce(&Baked, &mut dyn Progress) -> Result<T, E>,
+) -> Result<(Baked, T), E> {
+    let Some((baked, store)) = stages_of(scene, settings, None, engine, progress)? else {
         // All stages were to run.
-        None => Err(StoreError::Unreadable { stage: REPORT }.into()),
+        return Err(BakeError::from(StoreError::Unreadable { stage: REPORT }).into());
+    };
+    let written = last(&baked, progress)?;
+    if !settings.keep_work {
+        store.remove().map_err(BakeError::from)?;
     }
+    Ok((baked, written))
 }
 
 /// Runs one job of a bake: a stage whose result is not stored yet, given the stored results of all stages before it.
@@ -125,17 +143,17 @@ pub(crate) fn bake_job(
     stages_of(scene, settings, Some(job), engine, progress).map(drop)
 }
 
-/// Runs the stages of a bake, or one job. `None` unless the report has been written.
+/// Runs the stages of a bake, or one job. Returns the bake and the folder of its results; `None` unless the report has
+/// been written.
 fn stages_of(
     scene: GaussianScene,
     settings: &BakeSettings,
     job: Option<Job>,
     engine: &mut Engine,
     progress: &mut dyn Progress,
-) -> Result<Option<Baked>, BakeError> {
+) -> Result<Option<(Baked, Store)>, BakeError> {
     settings.check_files()?;
-    require_unpacked(&scene.form).map_err(|error| FileError::at(&settings.checkpoint, error))?;
-    let mut inputs = Inputs::open(scene, settings, job, engine, progress)?;
+    let mut inputs = Inputs::open(bakeable(scene, settings)?, settings, job, engine, progress)?;
     require_room(&inputs)?;
     let store = inputs.store.clone();
     let mut stages = Stages::begin("bake", STAGES, &store, progress).only(job.map(|job| job.stage));
@@ -171,10 +189,7 @@ fn stages_of(
         Ok(Baked { report, json, html })
     })?;
     stages.finish();
-    if job.is_none() && !settings.keep_work {
-        store.remove()?;
-    }
-    Ok(Some(baked))
+    Ok(Some((baked, store)))
 }
 
 /// A package that is small enough, and how it was made.

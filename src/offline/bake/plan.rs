@@ -7,19 +7,23 @@
 
 use super::BakeError;
 use super::ahead::require_validation;
+use super::before_training::divided;
+use super::inputs::{bakeable, key_frames};
 use super::job::shard_name;
 use super::settings::BakeSettings;
+use super::size::require_least;
 use crate::offline::dataset::TrainingView;
 use crate::offline::dataset::selection::distinct_cameras;
 use crate::offline::dataset::splits::Splits;
+use crate::offline::engine::memory::{IMAGE, PICTURE};
 use crate::offline::filter::temporal_filter::needs_views;
 use crate::offline::prune::search::{Goal, ScoreChoice};
 use crate::offline::report::report_paths;
 use crate::offline::store::results::{BAKE_FOLDER, folder_beside};
 use crate::offline::store::shard::Shard;
-use crate::offline::train::{FineTuneSettings, untrainable::obstacle};
+use crate::offline::train::{Divided, FineTuneSettings, TrainSettings, untrainable::obstacle};
 use crate::offline::work::Progress;
-use crate::scene::{SceneForm, TrainedWith};
+use crate::scene::GaussianScene;
 use serde::Serialize;
 use std::fs;
 use std::path::PathBuf;
@@ -83,12 +87,12 @@ impl Command {
 }
 
 /// What is baked.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug)]
 pub(crate) enum Source<'a> {
-    /// A scene with this number of Gaussians, of this form, trained with these settings.
-    Scene(usize, &'a SceneForm, &'a TrainedWith),
-    /// A capture that is trained from pictures: its number of Gaussians, and the steps.
-    Pictures(usize, usize),
+    /// This scene.
+    Scene(Box<GaussianScene>),
+    /// A capture that is trained from pictures with these settings.
+    Pictures(&'a TrainSettings),
 }
 
 /// Bytes of memory for each Gaussian: parameters, their copies for drawing and coding, sums of scores.
@@ -106,7 +110,8 @@ const OF_STEP: f64 = 4.0;
 /// Plans a bake whose scoring is done in `shards` shards, on GPUs or on CPUs.
 ///
 /// # Errors
-/// Views that cannot be used.
+/// What its jobs would refuse on any machine: a scene or views that cannot be used, images that are missing, a size
+/// below that of an empty package.
 pub(crate) fn plan(
     source: Source<'_>,
     settings: &BakeSettings,
@@ -116,21 +121,23 @@ pub(crate) fn plan(
     command: &Command,
     progress: &mut dyn Progress,
 ) -> Result<Plan, BakeError> {
-    let any_time = TrainedWith { time_interval: [f32::NEG_INFINITY, f32::INFINITY], ..TrainedWith::default() };
-    let trained_with = match source {
-        Source::Scene(_, _, trained_with) => trained_with,
-        Source::Pictures(..) => &any_time,
+    let tuning = settings.fine_tune.as_ref().filter(|_| gpu);
+    let (splits, views, count, tuning, training) = match source {
+        Source::Scene(scene) => {
+            let scene = bakeable(*scene, settings)?;
+            let splits = Splits::open(&settings.data, &settings.splits, &scene.trained_with, progress)?;
+            let views = splits.all_training(&scene.trained_with, progress)?;
+            let tuning = tuning.filter(|_| obstacle(&scene.form, &views).is_none());
+            require_least(&scene, settings, key_frames(settings, &views), tuning.is_some())?;
+            (splits, views, scene.len(), tuning, None)
+        }
+        Source::Pictures(training) => {
+            let Divided { splits, views, .. } = divided(settings, training, progress)?;
+            (splits, views, training.start.gaussians, tuning, Some(training.tuning.steps))
+        }
     };
-    let splits = Splits::open(&settings.data, &settings.splits, trained_with, progress)?;
     require_validation(settings, &splits)?;
-    let views = splits.all_training(trained_with, progress)?;
-    let is_tuned = gpu
-        && match source {
-            Source::Scene(_, form, _) => obstacle(form, &views).is_none(),
-            Source::Pictures(..) => true,
-        };
-    let tuning = settings.fine_tune.as_ref().filter(|_| is_tuned);
-    let planner = Planner { settings, splits: &splits, views: &views, gpu, tuning, source, command };
+    let planner = Planner { settings, splits: &splits, views: &views, gpu, count, tuning, training, command };
     let generator = format!("gs4d {}", env!("CARGO_PKG_VERSION"));
     Ok(Plan { generator, directory, package: settings.out.clone(), jobs: planner.jobs(shards) })
 }
@@ -140,8 +147,11 @@ struct Planner<'a> {
     splits: &'a Splits,
     views: &'a [TrainingView],
     gpu: bool,
+    /// Number of Gaussians before pruning.
+    count: usize,
     tuning: Option<&'a FineTuneSettings>,
-    source: Source<'a>,
+    /// Steps of the training from pictures, if there is one.
+    training: Option<usize>,
     command: &'a Command,
 }
 
@@ -150,7 +160,7 @@ impl Planner<'_> {
         let mut jobs = Vec::new();
         let (out, scored) = (&self.settings.out, self.splits.train.len() as f64 * self.draw());
         let stored = |name: &str| vec![self.folder().join(name)];
-        if let Source::Pictures(_, steps) = self.source {
+        if let Some(steps) = self.training {
             let outputs = vec![self.settings.checkpoint.clone(), self.folder().join("train")];
             jobs.push(self.job("train".to_owned(), "train", &[], &[], outputs, self.steps(steps)));
         }
@@ -182,7 +192,7 @@ impl Planner<'_> {
         }
         push("mask", &[], stored("mask"), self.mask());
         let coding = self.tuning.map_or(0.0, |tuning| self.steps(tuning.steps) / 3.0);
-        push("compress", &[], stored("compress"), self.count() as f64 * 2e-5 + coding);
+        push("compress", &[], stored("compress"), self.count as f64 * 2e-5 + coding);
         let tested = self.views.len().min(200) as f64;
         let reports = report_paths(out).into_iter();
         let outputs = [out.clone()].into_iter().chain(reports).collect();
@@ -209,9 +219,12 @@ impl Planner<'_> {
         if stage != "train" && !after.is_empty() {
             inputs.push(self.folder());
         }
-        let trains = matches!(stage, "train" | "prune" | "rounds" | "fine-tune" | "compress") && self.tuning.is_some();
-        let images = if trains { self.views.len() as u64 * self.pixels() * 4 } else { 0 };
-        let memory_bytes = OF_PROGRAM + self.count() as u64 * OF_GAUSSIAN + self.pixels() * OF_PIXEL + images;
+        let tunes = matches!(stage, "prune" | "rounds" | "fine-tune" | "compress") && self.tuning.is_some();
+        let trained = if tunes || stage == "train" { self.views.len() as u64 * IMAGE } else { 0 };
+        // Counts are compared with every validation view.
+        let compared = if stage == "prune" { self.splits.validation.len() as u64 * PICTURE } else { 0 };
+        let of_pixels = self.pixels() * (OF_PIXEL + trained + compared);
+        let memory_bytes = OF_PROGRAM + self.count as u64 * OF_GAUSSIAN + of_pixels;
         // The scene and the images are read, and hashed.
         let read = fs::metadata(&self.settings.checkpoint).map_or(0, |file| file.len()) as f64 / 2e8;
         let seconds = (1.0 + read + self.views.len() as f64 * 2e-3 + seconds).ceil();
@@ -225,12 +238,6 @@ impl Planner<'_> {
         folder_beside(&self.settings.out, BAKE_FOLDER)
     }
 
-    fn count(&self) -> usize {
-        match self.source {
-            Source::Scene(count, ..) | Source::Pictures(count, _) => count,
-        }
-    }
-
     /// Returns the number of pixels of the largest view.
     fn pixels(&self) -> u64 {
         let pixels = |view: &TrainingView| u64::from(view.camera.size.x) * u64::from(view.camera.size.y);
@@ -240,7 +247,7 @@ impl Planner<'_> {
     /// Returns the seconds in which a view is drawn.
     fn draw(&self) -> f64 {
         let [of_pixel, of_gaussian] = if self.gpu { ON_GPU } else { ON_CPU };
-        self.pixels() as f64 * of_pixel + self.count() as f64 * of_gaussian
+        self.pixels() as f64 * of_pixel + self.count as f64 * of_gaussian
     }
 
     /// Returns the seconds of steps of training.
@@ -260,7 +267,7 @@ impl Planner<'_> {
 
     fn mask(&self) -> f64 {
         if !needs_views(self.settings.filter) {
-            return self.count() as f64 * 1e-5;
+            return self.count as f64 * 1e-5;
         }
         let keys = self.settings.key_frames.count(self.views) * distinct_cameras(self.views).len();
         (keys + self.views.len()) as f64 * self.draw()

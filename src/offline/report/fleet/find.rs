@@ -74,7 +74,8 @@ mod tests {
         for name in ["a.gs4d", "a.trained.gs4d", "a.report.json", ".gs4d-x.part", "b/c.gs4d", "e.tune/f.gs4d"] {
             fs::write(path(name), "").expect("the folder can be written to");
         }
-        let found = find_packages(&[path("missing.gs4d"), folder.path().to_owned(), path("a.gs4d"), path("b/../a.gs4d")]);
+        let found =
+            find_packages(&[path("missing.gs4d"), folder.path().to_owned(), path("a.gs4d"), path("b/../a.gs4d")]);
         let expected = ["missing.gs4d", "a.gs4d", "b/c.gs4d", "d.gs4d"].map(path);
         assert_eq!(found.expect("folders that can be read"), expected, "each result once, and nothing else");
         fs::create_dir(path("empty")).expect("the folder can be written to");
