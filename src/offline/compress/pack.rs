@@ -17,7 +17,7 @@ use crate::scene::packed::order::{Order, is_filler};
 use crate::scene::packed::pack::{encode_ordered, pack_ordered};
 use crate::scene::{
     ChunkTable, CodedColors, FilterKind, Form, GaussianScene, PackedColors, Packing, RuntimeScene, SceneForm, Sliced,
-    TemporalFilter, TrainedWith,
+    TemporalFilter,
 };
 use ndarray::Array2;
 use serde::Serialize;
@@ -102,8 +102,7 @@ pub(crate) fn compress_tied(
 fn anchored(mut scene: RuntimeScene, settings: &CompressSettings) -> RuntimeScene {
     if let (Form::Sliced(sliced), Some(_), false) = (&mut scene.form, &settings.geometry, settings.codebooks.is_empty())
     {
-        let TrainedWith { time_interval, marginal_cutoff, .. } = scene.trained_with;
-        move_near(&mut sliced.gaussians, time_interval, marginal_cutoff);
+        move_near(sliced, &scene.trained_with);
     }
     scene
 }

@@ -1,15 +1,18 @@
 //! Temporal means near the time interval, for the packed form, which has one range for all temporal means.
 //!
-//! In: Gaussians, the time interval, timestamp units. Out: the same Gaussians at the same positions at all times.
-//! Gaussians whose temporal mean was far from the interval have nearly the same opacity as before; Gaussians that are
-//! never drawn are still never drawn.
+//! In: Gaussians with their color, the time interval and the period of colors. Out: the same Gaussians at the same
+//! positions at all times. Gaussians whose temporal mean was far from the interval have nearly the same opacity as
+//! before; Gaussians that are never drawn are still never drawn.
 //!
 //! In the interval, such a Gaussian shows a flank of its marginal. A marginal with a nearer mean, of the same value and
-//! slope in the middle of the interval, differs in curvature alone. The temporal mean moves by whole intervals, the
-//! period of the time harmonics. Colors are evaluated in the direction of the mean, which moves too: they change where
-//! the mean moves by much of the distance to the camera.
+//! slope in the middle of the interval, differs in curvature alone. The temporal mean moves by whole periods of colors
+//! that change with time, and stays where it is if a period is too long; otherwise by whole intervals. Colors are
+//! evaluated in the direction of the mean, which moves too: they change where the mean moves by much of the distance to
+//! the camera.
 
 use crate::gaussian::Gaussian;
+use crate::scene::provenance::TrainedWith;
+use crate::scene::sliced::Sliced;
 use rayon::prelude::*;
 
 /// Temporal means up to this distance from the middle of the time interval are not moved, lengths of the interval.
@@ -22,18 +25,20 @@ const CHANGE: f64 = 0.002;
 /// look nearly the same.
 const LONG: f64 = 1000.0;
 
-/// Moves temporal means that are far from the interval close to it. `cutoff` is the marginal at and below which a
-/// Gaussian is not drawn.
-pub(crate) fn move_near(gaussians: &mut [Gaussian], interval: [f32; 2], cutoff: f32) {
-    let [start, end] = interval.map(f64::from);
+/// Moves temporal means that are far from the interval close to it.
+pub(crate) fn move_near(sliced: &mut Sliced, trained_with: &TrainedWith) {
+    let [start, end] = trained_with.time_interval.map(f64::from);
     let (middle, span) = (0.5 * (start + end), end - start);
+    let period = if sliced.harmonics.degree_t > 0 { f64::from(trained_with.period_of_colors()) } else { span };
     // The interval of a still has no length.
-    if span > 0.0 {
-        gaussians.par_iter_mut().for_each(|gaussian| move_one(gaussian, middle, span, cutoff));
+    if span > 0.0 && period > 0.0 {
+        let cutoff = trained_with.marginal_cutoff;
+        sliced.gaussians.par_iter_mut().for_each(|gaussian| move_one(gaussian, middle, span, period, cutoff));
     }
 }
 
-fn move_one(gaussian: &mut Gaussian, middle: f64, span: f64, cutoff: f32) {
+/// Moves one temporal mean by whole periods. `cutoff` is the marginal at and below which a Gaussian is not drawn.
+fn move_one(gaussian: &mut Gaussian, middle: f64, span: f64, period: f64, cutoff: f32) {
     let away = f64::from(gaussian.mean_t) - middle;
     let distance = away.abs();
     if distance <= FAR * span {
@@ -44,9 +49,11 @@ fn move_one(gaussian: &mut Gaussian, middle: f64, span: f64, cutoff: f32) {
     // multiplies rounding errors of the velocity by a short time.
     let slope = distance / (sigma_t * sigma_t);
     let nearest = (slope * span * span / (8.0 * CHANGE)).clamp(NEAR * span, (FAR - 1.0) * span);
-    // A whole number of intervals, except for distances so large that an interval is less than their rounding.
-    let near = (distance - ((distance - nearest) / span).floor() * span).clamp(nearest, nearest + span);
     let largest_marginal = (-0.5 * ((distance - 0.5 * span) / sigma_t).powi(2)).exp();
+    // One that is never drawn has no color.
+    let step = if largest_marginal <= f64::from(cutoff) { span } else { period };
+    // A whole number of steps, except for distances so large that a step is less than their rounding.
+    let near = (distance - ((distance - nearest) / step).floor() * step).clamp(nearest, nearest + step);
     gaussian.mean_t = (middle + near.copysign(away)) as f32;
     if largest_marginal <= f64::from(cutoff) {
         gaussian.opacity = 0.0;
@@ -69,7 +76,7 @@ fn move_one(gaussian: &mut Gaussian, middle: f64, span: f64, cutoff: f32) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gaussian::MARGINAL_CUTOFF;
+    use crate::gaussian::Harmonics;
 
     fn gaussian(mean_t: f32, sigma_t: f32) -> Gaussian {
         Gaussian {
@@ -83,10 +90,14 @@ mod tests {
         }
     }
 
+    fn moved_one(gaussian: Gaussian, interval: [f32; 2]) -> Gaussian {
+        let mut one = Sliced { gaussians: vec![gaussian], harmonics: Harmonics::default() };
+        move_near(&mut one, &TrainedWith { time_interval: interval, ..TrainedWith::default() });
+        one.gaussians[0]
+    }
+
     fn moved(mean_t: f32, sigma_t: f32, interval: [f32; 2]) -> Gaussian {
-        let mut one = [gaussian(mean_t, sigma_t)];
-        move_near(&mut one, interval, MARGINAL_CUTOFF);
-        one[0]
+        moved_one(gaussian(mean_t, sigma_t), interval)
     }
 
     #[test]
@@ -137,9 +148,24 @@ mod tests {
     #[test]
     fn gaussians_of_constant_opacity_keep_it() {
         let before = Gaussian { velocity: [0.0; 3], ..gaussian(1e6, f32::INFINITY) };
-        let mut after = [before];
-        move_near(&mut after, [0.0, 1.0], MARGINAL_CUTOFF);
-        assert_eq!(after[0], Gaussian { mean_t: after[0].mean_t, ..before }, "only the temporal mean is moved");
-        assert!(after[0].mean_t <= 4.5, "it is near the interval: {}", after[0].mean_t);
+        let after = moved_one(before, [0.0, 1.0]);
+        assert_eq!(after, Gaussian { mean_t: after.mean_t, ..before }, "only the temporal mean is moved");
+        assert!(after.mean_t <= 4.5, "it is near the interval: {}", after.mean_t);
+    }
+
+    #[test]
+    fn temporal_means_move_by_whole_periods_of_colors_that_change_with_time() {
+        for period in [0.3, 1.7, 60.0] {
+            let harmonics = Harmonics { coefficients: 32, degree: 3, degree_t: 1, values: vec![0.5; 192] };
+            let mut sliced = Sliced { gaussians: vec![gaussian(40.0, 50.0), gaussian(90.0, 1.0)], harmonics };
+            let trained_with =
+                TrainedWith { time_interval: [0.0, 1.0], color_period: Some(period), ..TrainedWith::default() };
+            move_near(&mut sliced, &trained_with);
+            let [drawn, never] = [0, 1].map(|index| sliced.gaussians[index]);
+            let periods = (40.0 - drawn.mean_t) / period;
+            assert!((periods - periods.round()).abs() < 1e-3, "{periods} periods of {period}");
+            assert!(drawn.mean_t <= 4.5 || period > 40.0, "it is near the interval: {}", drawn.mean_t);
+            assert!(never.mean_t <= 4.5 && never.opacity == 0.0, "one that is never drawn moves anyway: {never:?}");
+        }
     }
 }

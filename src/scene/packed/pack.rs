@@ -95,9 +95,8 @@ impl RuntimeScene {
         order: impl FnOnce(&Self) -> Result<Order, E>,
     ) -> Result<Self, E> {
         packing.check()?;
-        let TrainedWith { time_interval, marginal_cutoff, .. } = self.trained_with;
         let Form::Sliced(sliced) = &mut self.form else { return Err(PackError::AlreadyPacked.into()) };
-        move_near(&mut sliced.gaussians, time_interval, marginal_cutoff);
+        move_near(sliced, &self.trained_with);
         let order = order(&self)?;
         let Form::Sliced(sliced) = &self.form else { return Err(PackError::AlreadyPacked.into()) };
         let colors = PackedColors::Whole(rounded(sliced.harmonics.select(&order.indices), packing.color_step));
