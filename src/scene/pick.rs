@@ -28,7 +28,7 @@
 use super::{RuntimeScene, TemporalFilter};
 use crate::gaussian::Gaussian;
 use crate::gaussian::alpha::{ALPHA_MIN, visible};
-use glam::{Affine3A, DMat3, DVec2, DVec3, Vec3};
+use glam::{Affine3A, DMat3, DVec2, DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 
 /// ε in parts of the trace of Σ: 2⁻²².
@@ -48,13 +48,24 @@ pub struct PickSettings {
     /// Transforms capture space to the cube from −1 to 1; Gaussians whose mean is outside are ignored. Default: `None`,
     /// no crop.
     pub crop: Option<Affine3A>,
+    /// A plane `p` in capture space, such as the near plane of a camera; Gaussians whose mean `m` is not in front of it,
+    /// `p.xyz · m + p.w > 0`, are ignored. Default: `None`, no plane.
+    pub near_plane: Option<Vec4>,
     /// Largest distance of a hit, in lengths of the ray's direction. Default: infinite.
     pub max_distance: f32,
 }
 
 impl Default for PickSettings {
     fn default() -> Self {
-        Self { time: 0.0, use_filter: true, threshold: 0.5, opacity: 1.0, crop: None, max_distance: f32::INFINITY }
+        Self {
+            time: 0.0,
+            use_filter: true,
+            threshold: 0.5,
+            opacity: 1.0,
+            crop: None,
+            near_plane: None,
+            max_distance: f32::INFINITY,
+        }
     }
 }
 
@@ -136,8 +147,10 @@ impl Ray {
         let mean = gaussian.mean_at(settings.time);
         let peak = gaussian.opacity * marginal * settings.opacity;
         let is_inside = |crop: Affine3A| crop.transform_point3(mean).abs().cmple(Vec3::ONE).all();
-        let is_there = marginal > cutoff && peak >= ALPHA_MIN && settings.crop.is_none_or(is_inside);
-        if !is_there {
+        let is_in_front = |plane: Vec4| plane.dot(mean.extend(1.0)) > 0.0;
+        let is_kept = settings.crop.is_none_or(is_inside) && settings.near_plane.is_none_or(is_in_front);
+        let is_there = marginal > cutoff && peak >= ALPHA_MIN;
+        if !(is_there && is_kept) {
             return None;
         }
         let [xx, xy, xz, yy, yz, zz] = gaussian.covariance.map(f64::from);

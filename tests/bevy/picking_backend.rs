@@ -131,6 +131,12 @@ fn only_captures_that_the_camera_draws_are_hit() {
     assert_eq!(clicked(&mut app), [capture], "a capture on a layer of the camera is hit");
     insert(&mut app, capture, Visibility::Hidden);
     assert_eq!(clicked(&mut app), [Entity::PLACEHOLDER; 0], "a hidden capture is not hit");
+    insert(&mut app, capture, Visibility::Inherited);
+    // Captures are drawn from 0.2 units on, rays begin at 0.1.
+    for (distance, expected) in [(0.25, vec![capture]), (0.15, Vec::new())] {
+        insert(&mut app, camera, Transform::from_xyz(0.0, 0.0, distance));
+        assert_eq!(clicked(&mut app), expected, "the Gaussian is {distance} from the camera");
+    }
 }
 
 #[test]

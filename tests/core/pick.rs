@@ -112,6 +112,13 @@ fn settings_of_a_pick_are_respected() {
     assert_eq!(hit(PickSettings { crop: Some(far.inverse()), ..base }), Some(1), "the first Gaussian is cropped");
     let nowhere = Affine3A::from_scale(Vec3::NAN);
     assert_eq!(hit(PickSettings { crop: Some(nowhere), ..base }), None, "a crop box of NaN contains no Gaussian");
+    let plane = |depth: f32| Some(Vec3::Z.extend(-depth));
+    assert_eq!(
+        hit(PickSettings { near_plane: plane(4.9), ..base }),
+        Some(0),
+        "both Gaussians are behind the near plane"
+    );
+    assert_eq!(hit(PickSettings { near_plane: plane(5.0), ..base }), Some(1), "the first Gaussian is before it");
     assert_eq!(hit(PickSettings { time: f32::NAN, ..base }), None, "a time of NaN");
 }
 

@@ -6,6 +6,7 @@ use crate::gaussian::alpha::reach_squared;
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use crate::plugin::playback::{ClipFade, Playback};
 use crate::plugin::render::CaptureSettings;
+use crate::plugin::render::captures::view::CameraLens;
 use crate::plugin::render::logged::warn_once_each;
 use crate::scene::{PickSettings, RuntimeScene};
 use bevy::asset::Assets;
@@ -15,7 +16,7 @@ use bevy::ecs::query::ROQueryItem;
 use bevy::ecs::system::{Query, Res, SystemParam};
 use bevy::math::Ray3d;
 use bevy::transform::components::GlobalTransform;
-use glam::Vec3;
+use glam::{Affine3A, UVec2, Vec3, Vec4};
 use std::sync::Arc;
 
 /// Where a ray hits a capture.
@@ -78,6 +79,9 @@ pub struct CapturePicker<'w, 's> {
     captures: Query<'w, 's, Placed>,
 }
 
+/// The lens and the pose of the camera through which a ray goes.
+type Eye<'a> = (&'a CameraLens, Affine3A);
+
 type Placed = (
     Entity,
     &'static GaussianCapture3d,
@@ -93,20 +97,22 @@ impl CapturePicker<'_, '_> {
     /// `None` if the ray hits none. Each capture is tested alone: the ray passes through two captures that absorb half
     /// of the light only together.
     pub fn cast(&self, ray: Ray3d) -> Option<CaptureHit> {
-        Aim::cast_all(&self.aims(ray, |_, visibility| visibility.get(), |_| true)).first().copied()
+        Aim::cast_all(&self.aims(ray, None, |_, visibility| visibility.get(), |_| true)).first().copied()
     }
 
     /// Returns the searches of a ray in all captures for which `takes_part` is true and whose box it meets, nearest box
-    /// first. `blocks` says whether a capture hides the captures behind it from the ray.
+    /// first. Gaussians that the `eye` does not draw because they are too near are not hit. `blocks` says whether a
+    /// capture hides the captures behind it from the ray.
     pub(crate) fn aims(
         &self,
         ray: Ray3d,
+        eye: Option<Eye<'_>>,
         takes_part: impl Fn(Entity, InheritedVisibility) -> bool,
         blocks: impl Fn(Entity) -> bool,
     ) -> Vec<Aim> {
         let captures = self.captures.iter().filter(|(entity, .., visibility, _)| takes_part(*entity, **visibility));
         let mut aims: Vec<Aim> = captures
-            .filter_map(|placed| self.aim(placed, ray).map(|aim| Aim { blocks: blocks(aim.entity), ..aim }))
+            .filter_map(|placed| self.aim(placed, ray, eye).map(|aim| Aim { blocks: blocks(aim.entity), ..aim }))
             .collect();
         aims.sort_by(|a, b| a.entry.total_cmp(&b.entry));
         aims
@@ -114,14 +120,16 @@ impl CapturePicker<'_, '_> {
 
     /// Returns the hit of one capture, hidden or not; `None` if the ray misses it, or it is not loaded or has scale 0.
     pub fn cast_on(&self, entity: Entity, ray: Ray3d) -> Option<CaptureHit> {
-        self.aim(self.captures.get(entity).ok()?, ray)?.cast(f32::INFINITY)
+        self.aim(self.captures.get(entity).ok()?, ray, None)?.cast(f32::INFINITY)
     }
 
-    /// Returns the search of a ray in one capture; `None` if the ray misses its box, or as for [`Self::cast_on`].
+    /// Returns the search of a ray in one capture; `None` if the ray misses its box, the eye cannot see it, or as for
+    /// [`Self::cast_on`].
     fn aim(
         &self,
         (entity, handle, settings, playback, transform, _, fade): ROQueryItem<'_, '_, Placed>,
         ray: Ray3d,
+        eye: Option<Eye<'_>>,
     ) -> Option<Aim> {
         let capture = self.assets.get(&handle.0)?;
         if capture.is_released() {
@@ -142,11 +150,16 @@ impl CapturePicker<'_, '_> {
         let direction = from_world.transform_vector3(*ray.direction);
         let bounds = capture.bounds_at(playback.time)?.scaled(reach(appearance.opacity));
         let entry = bounds.entry(origin, direction)?;
+        let near_plane = match eye {
+            Some((lens, world_from_camera)) => Some(near_plane(lens, world_from_camera, affine, capture)?),
+            None => None,
+        };
         let settings = PickSettings {
             time: capture.time_at(playback.time),
             use_filter: settings.filter,
             opacity: appearance.opacity,
             crop: appearance.crop,
+            near_plane,
             ..PickSettings::default()
         };
         let scene = capture.shared_scene();
@@ -217,6 +230,20 @@ impl Aim {
         hits.sort_by(|a, b| a.distance.total_cmp(&b.distance));
         hits
     }
+}
+
+/// Returns the plane, in the space of a placed capture, behind which a camera draws its Gaussians; `None` if it is not
+/// drawn.
+fn near_plane(
+    lens: &CameraLens,
+    world_from_camera: Affine3A,
+    world_from_capture: Affine3A,
+    capture: &GaussianCapture,
+) -> Option<Vec4> {
+    // The plane depends neither on the size of the picture nor on the time and the level of detail.
+    let view = lens.view(UVec2::ONE, 0.0, world_from_camera, world_from_capture)?;
+    let view = view.with_optics(capture.scene().optics(0, false));
+    Some(view.world_to_camera.row(2) - Vec4::W * view.near)
 }
 
 /// Returns the factor on a box of three standard deviations (as bounds are) beyond which no alpha reaches 1/255:

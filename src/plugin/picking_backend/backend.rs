@@ -7,6 +7,7 @@ use super::settings::{CapturePickingCamera, CapturePickingSettings};
 use crate::plugin::asset::CaptureState;
 use crate::plugin::component::GaussianCapture3d;
 use crate::plugin::picker::CapturePicker;
+use crate::plugin::render::captures::view::CameraLens;
 use bevy::camera::visibility::{RenderLayers, ViewVisibility};
 use bevy::camera::{Camera, Camera3d};
 use bevy::ecs::entity::Entity;
@@ -17,6 +18,7 @@ use bevy::log::debug_span;
 use bevy::picking::backend::ray::RayMap;
 use bevy::picking::backend::{HitData, PointerHits};
 use bevy::picking::{Pickable, PickingSettings};
+use bevy::transform::components::GlobalTransform;
 
 /// Returns whether any pointer is over a camera's target, in an app with Bevy's `PickingPlugin`.
 pub(super) fn any_ray(rays: Option<Res<RayMap>>) -> bool {
@@ -28,7 +30,7 @@ pub(super) fn update_hits(
     picking: Res<PickingSettings>,
     settings: Res<CapturePickingSettings>,
     rays: Res<RayMap>,
-    cameras: Query<(&Camera, Has<CapturePickingCamera>, Option<&RenderLayers>), With<Camera3d>>,
+    cameras: Query<(&Camera, &GlobalTransform, Has<CapturePickingCamera>, Option<&RenderLayers>), With<Camera3d>>,
     captures: Query<
         (&ViewVisibility, &CaptureState, Option<&Pickable>, Option<&RenderLayers>),
         With<GaussianCapture3d>,
@@ -43,10 +45,12 @@ pub(super) fn update_hits(
     }
     let _span = debug_span!("gs4d/pointers").entered();
     for (id, ray) in rays.iter() {
-        let Ok((camera, is_marked, layers)) = cameras.get(id.camera) else { continue };
+        let Ok((camera, transform, is_marked, layers)) = cameras.get(id.camera) else { continue };
         if settings.require_markers && !is_marked {
             continue;
         }
+        // A camera without a lens draws no captures.
+        let Some(lens) = CameraLens::of(&camera.clip_from_view()) else { continue };
         let layers = layers.cloned().unwrap_or_default();
         let takes_part = |capture: Entity| {
             let Ok((visibility, state, pickable, its_layers)) = captures.get(capture) else { return false };
@@ -61,7 +65,7 @@ pub(super) fn update_hits(
             let Ok((_, _, pickable, _)) = captures.get(capture) else { return false };
             pickable.is_none_or(|pickable| pickable.should_block_lower)
         };
-        let aims = picker.aims(*ray, |capture, _| takes_part(capture), blocks);
+        let aims = picker.aims(*ray, Some((&lens, transform.affine())), |capture, _| takes_part(capture), blocks);
         let picks: Vec<(Entity, HitData)> = searches
             .hits(*id, aims)
             .into_iter()

@@ -22,10 +22,11 @@
 //! ```
 //!
 //! A pointer hits the same Gaussian as [`CapturePicker`](crate::picker::CapturePicker): the one at which half of the
-//! light along the ray is absorbed. The depth of a hit is its distance along the ray in world units, as in Bevy's mesh
-//! picking. With Bevy's `MeshPickingPlugin`, meshes in front of a capture take its events, and captures in front of a
-//! mesh take the events of the mesh. The position of a hit is its point in world space, it has no normal, and its extra
-//! data is the [`CaptureHit`](crate::picker::CaptureHit).
+//! light along the ray is absorbed, of those that are not too near for the camera to draw them. The depth of a hit is
+//! its distance along the ray in world units, as in Bevy's mesh picking. With Bevy's `MeshPickingPlugin`, meshes in
+//! front of a capture take its events, and captures in front of a mesh take the events of the mesh. The position of a
+//! hit is its point in world space, it has no normal, and its extra data is the
+//! [`CaptureHit`](crate::picker::CaptureHit).
 //!
 //! `Pickable` on a capture has its usual meaning: `Pickable::IGNORE` lets pointers through. Four kinds of captures are
 //! not hit: hidden ones, ones that no camera sees, ones on other `RenderLayers`, and ones that are not
