@@ -10,7 +10,7 @@ use crate::support::cpu_reference::{DURATION, difference_between, rgb, scene};
 use crate::support::fixtures::{insert, spawn};
 use crate::support::offscreen_app::{FOV_Y, app, picture, spawn_camera};
 use bevy::camera::Hdr;
-use bevy::camera::visibility::{RenderLayers, ViewVisibility};
+use bevy::camera::visibility::{RenderLayers, ViewVisibility, VisibilityRange};
 use bevy::light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap, NotShadowCaster, PointLightShadowMap};
 use bevy::prelude::*;
 use bevy_gs4d::GaussianCapture3d;
@@ -228,7 +228,7 @@ fn only_captures_with_the_component_cast_shadows_on_layers_of_the_light() {
 }
 
 #[test]
-fn a_capture_with_not_shadow_caster_casts_no_shadow() {
+fn a_capture_with_not_shadow_caster_or_out_of_range_casts_no_shadow() {
     for (name, light) in [("sun", 0), ("point light", 1), ("spot light", 2)] {
         let app = match light {
             0 => scenery(above(5.0), sun(Vec3::NEG_Y)),
@@ -247,6 +247,9 @@ fn a_capture_with_not_shadow_caster_casts_no_shadow() {
         assert!(without > 300, "{name}: {without} pixels of shadow after the component is removed");
         insert(&mut app, capture, NotShadowCaster);
         assert_eq!(seen(&mut app), 0, "{name}: no shadow after the component is inserted again");
+        app.world_mut().entity_mut(capture).remove::<NotShadowCaster>();
+        insert(&mut app, capture, VisibilityRange::abrupt(0.0, 2.0));
+        assert_eq!(seen(&mut app), 0, "{name}: no shadow out of range of the camera");
     }
 }
 

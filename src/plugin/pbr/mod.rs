@@ -4,6 +4,7 @@
 //! form one scene, with common order, fog, light and shadows.
 
 mod contact_shadow;
+mod in_range;
 mod order;
 mod plugin;
 mod shade;

@@ -13,7 +13,7 @@ use glam::{Affine3A, Vec3};
 /// The ellipse is inscribed in the capture's bounds seen from above and follows them over time. It fades with the
 /// capture's opacity, with the height above the ground, and in fog. It needs no light, and costs as much as one small
 /// quad. It is drawn over opaque and alpha-masked meshes and behind captures, by every camera whose layers intersect
-/// the capture's, while the capture is visible.
+/// the capture's and that is within its `VisibilityRange`, while the capture is visible.
 ///
 /// # Examples
 ///

@@ -1,15 +1,17 @@
 //! Extract: copies the contact shadows of this frame.
 //!
-//! In (main world): captures with a [`CaptureContactShadow`], their bounds, visibility and layers. Out (render world):
-//! [`ExtractedContactShadows`].
+//! In (main world): captures with a [`CaptureContactShadow`], their bounds, visibility, layers and ranges. Out (render
+//! world): [`ExtractedContactShadows`].
 
 use super::component::{CaptureContactShadow, Ellipse};
 use crate::plugin::asset::CaptureState;
 use crate::plugin::component::GaussianCapture3d;
+use crate::plugin::pbr::in_range::{InRange, Ranges};
 use crate::plugin::playback::ClipFade;
 use crate::plugin::render::CaptureSettings;
 use bevy::camera::primitives::Aabb;
 use bevy::camera::visibility::{InheritedVisibility, RenderLayers};
+use bevy::ecs::entity::Entity;
 use bevy::ecs::query::With;
 use bevy::ecs::resource::Resource;
 use bevy::ecs::system::{Query, Res, ResMut};
@@ -28,6 +30,7 @@ pub(super) struct PlacedShadow {
     /// Softness of the edge, from 0 to 1.
     pub(super) softness: f32,
     pub(super) layers: RenderLayers,
+    pub(super) in_range: InRange,
 }
 
 /// Returns whether any capture of the main world has a contact shadow.
@@ -41,6 +44,7 @@ pub(super) fn any_extracted(shadows: Res<ExtractedContactShadows>) -> bool {
 }
 
 type Placed = (
+    Entity,
     &'static CaptureContactShadow,
     &'static CaptureState,
     &'static CaptureSettings,
@@ -55,15 +59,18 @@ type Placed = (
 pub(super) fn extract_contact_shadows(
     mut extracted: ResMut<ExtractedContactShadows>,
     captures: Extract<Query<Placed, With<GaussianCapture3d>>>,
+    ranges: Extract<Ranges>,
 ) {
     extracted.0.clear();
-    let shadows =
-        captures.iter().filter_map(|(settings, state, capture, fade, transform, visibility, bounds, layers)| {
+    let shadows = captures.iter().filter_map(
+        |(entity, settings, state, capture, fade, transform, visibility, bounds, layers)| {
             let bounds = bounds.filter(|_| *state == CaptureState::Ready && visibility.get())?;
             let opacity = capture.appearance(fade.copied().unwrap_or_default().0).opacity.min(1.0);
             let ellipse = ellipse(settings, bounds, &transform.affine(), opacity)?;
-            Some(PlacedShadow { ellipse, softness: settings.softness(), layers: layers.cloned().unwrap_or_default() })
-        });
+            let (softness, layers) = (settings.softness(), layers.cloned().unwrap_or_default());
+            Some(PlacedShadow { ellipse, softness, layers, in_range: ranges.of(entity) })
+        },
+    );
     extracted.0.extend(shadows);
 }
 

@@ -70,7 +70,9 @@ pub(super) fn prepare_contact_shadows(
         let world_from_view = view.world_from_view.affine();
         let clip_from_world =
             view.clip_from_world.unwrap_or_else(|| view.clip_from_view * Mat4::from(world_from_view.inverse()));
-        for shadow in shadows.0.iter().filter(|shadow| shadow.layers.intersects(layers)) {
+        let camera = view.retained_view_entity.main_entity;
+        let is_seen = |shadow: &&PlacedShadow| shadow.layers.intersects(layers) && shadow.in_range.of(camera);
+        for shadow in shadows.0.iter().filter(is_seen) {
             views.ellipses.push(seen(shadow, &clip_from_world, world_from_view.translation.into(), fog));
         }
         let ellipses = first as u32..views.ellipses.len() as u32;

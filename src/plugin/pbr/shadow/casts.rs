@@ -12,7 +12,8 @@ use glam::{Affine3A, Vec3A};
 ///
 /// The capture casts a shadow for every light with shadow maps, whether a camera sees the capture or not, at its
 /// current time, with its opacity, crop and temporal filter. Hidden captures, captures on `RenderLayers` that the light
-/// does not have, and captures with Bevy's `NotShadowCaster` cast no shadows.
+/// does not have, and captures with Bevy's `NotShadowCaster` cast no shadows. A `VisibilityRange` holds for shadows as for
+/// those of meshes.
 ///
 /// Without this component captures cast no shadows, since each shadow costs up to one more view of the capture, as
 /// large as the shadow map at its [`resolution`](Self::resolution): for a directional light one for each cascade and

@@ -1,11 +1,12 @@
 //! Extract: copies the captures that cast shadows.
 //!
-//! In (main world): captures with [`CastsShadows`] and without Bevy's `NotShadowCaster`, their bounds and layers; the
-//! extracted captures. Out (render world): [`ExtractedCasters`]; the extracted captures marked as casters, so that
+//! In (main world): captures with [`CastsShadows`] and without Bevy's `NotShadowCaster`, their bounds, layers and ranges;
+//! the extracted captures. Out (render world): [`ExtractedCasters`]; the extracted captures marked as casters, so that
 //! their active lists are updated even if no camera sees them.
 
 use super::casts::{CastsShadows, ShadowResolution};
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d, StreamedPicture};
+use crate::plugin::pbr::in_range::{InRange, Ranges};
 use crate::plugin::playback::Playback;
 use crate::plugin::render::ExtractedCaptures;
 use bevy::asset::Assets;
@@ -47,6 +48,7 @@ pub(super) struct Caster {
     pub(super) bounds: Aabb,
     pub(super) world_from_capture: Affine3A,
     pub(super) layers: RenderLayers,
+    pub(super) in_range: InRange,
 }
 
 type Placed = (
@@ -65,6 +67,7 @@ pub(super) fn extract_casters(
     mut extracted: ResMut<ExtractedCaptures>,
     assets: Extract<Res<Assets<GaussianCapture>>>,
     captures: Extract<Query<Placed, Casting>>,
+    ranges: Extract<Ranges>,
 ) {
     casters.0.clear();
     for (entity, capture, settings, playback, visibility, bounds, layers, picture) in &captures {
@@ -80,6 +83,10 @@ pub(super) fn extract_casters(
             (bounds.min.is_finite() && bounds.max.is_finite()).then(|| Aabb::from_min_max(bounds.min, bounds.max))
         };
         let Some(bounds) = bounds.copied().or_else(known) else { continue };
+        let in_range = ranges.of(entity.id());
+        if in_range.is_nowhere() {
+            continue;
+        }
         let extent = picture.map_or(asset.extent(), |picture| picture.extent);
         (placed.seen, placed.casts) = (true, true);
         casters.0.push(Caster {
@@ -89,6 +96,7 @@ pub(super) fn extract_casters(
             bounds,
             world_from_capture: placed.world_from_capture,
             layers: layers.cloned().unwrap_or_default(),
+            in_range,
         });
     }
 }

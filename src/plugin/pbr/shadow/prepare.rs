@@ -27,6 +27,7 @@ use bevy::render::render_asset::RenderAssets;
 use bevy::render::render_phase::ViewBinnedRenderPhases;
 use bevy::render::render_resource::PipelineCache;
 use bevy::render::renderer::{RenderDevice, RenderQueue};
+use bevy::render::sync_world::MainEntity;
 use bevy::render::view::{ExtractedView, RetainedViewEntity};
 use glam::UVec2;
 
@@ -52,11 +53,12 @@ pub(super) struct Casters<'w> {
 }
 
 impl Casters<'_> {
-    /// Returns the captures that reach into a view of a light, in the same order in every frame.
-    fn within(&self, frustum: &Frustum, layers: &RenderLayers) -> Vec<&Caster> {
+    /// Returns the captures that reach into a view of a light for a camera, in the same order in every frame.
+    fn within(&self, frustum: &Frustum, layers: &RenderLayers, camera: MainEntity) -> Vec<&Caster> {
         // Bevy has moved the near planes of directional lights to infinity.
         let reaches = |caster: &&Caster| {
             caster.layers.intersects(layers)
+                && caster.in_range.of(camera)
                 && frustum.intersects_obb(&caster.bounds, &caster.world_from_capture, true, true)
         };
         self.casters.0.iter().filter(reaches).collect()
@@ -102,7 +104,7 @@ pub(super) fn prepare_light_views(
         if !phases.contains_key(&key) || back_off.contains(&key) {
             continue;
         }
-        let within = casters.within(frustum, layers.unwrap_or_default());
+        let within = casters.within(frustum, layers.unwrap_or_default(), key.auxiliary_entity);
         if within.is_empty() && !views.0.contains_key(&key) {
             continue;
         }
