@@ -218,10 +218,12 @@ fn find_limits(pixel: vec2<u32>, inside: bool) {
 #endif
 }
 
-// Returns the camera-space depth of a value of the depth buffer. 0 means that there is no surface: the far plane.
+// Returns the camera-space depth of a value of the depth buffer. 0 means that there is no surface: the far plane. A
+// value beyond that of infinity is of another range of the buffer, which is behind.
 fn distance_of(depth: f32) -> f32 {
     let d = frame.opaque_distance;
-    return select(FAR, (d.x + d.y * depth) / (d.z + d.w * depth), depth > 0.0);
+    let divisor = d.z + d.w * depth;
+    return select(FAR, (d.x + d.y * depth) / divisor, depth > 0.0 && divisor > 0.0);
 }
 
 // Returns the fraction of the samples without a surface.

@@ -5,6 +5,7 @@
 
 use crate::view::View;
 use glam::{Affine3A, DMat3, DMat4, DVec4, Mat4, UVec2, Vec2, Vec4};
+use std::ops::Range;
 
 /// A camera's lens: a pinhole, or parallel rays.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,6 +74,18 @@ impl CameraLens {
         // d = w.z − z.z depth, which is 1 at the near plane.
         let rays = Rays::Parallel { projection, near: (w.z - 1.0) / z.z };
         Some(Self { rays, distance: Some(Vec4::new(w.z, -1.0, z.z, 0.0)) })
+    }
+
+    /// Returns the lens of a camera whose viewport maps depths to this range of the depth buffer, as `Viewport::depth`
+    /// does.
+    pub(crate) fn in_depth_range(self, range: &Range<f32>) -> Self {
+        let length = range.end - range.start;
+        // The value `d` of the whole range is (D − start) / length.
+        let within = |distance: Vec4| {
+            let [y, w] = [distance.y, distance.w].map(|factor| factor / length);
+            Vec4::new(distance.x - y * range.start, y, distance.z - w * range.start, w)
+        };
+        Self { distance: self.distance.filter(|_| length > 0.0).map(within), ..self }
     }
 
     /// Returns the view of one capture through this lens: `size` in pixels, `time` in the capture's unit. `None` if the
@@ -193,6 +206,15 @@ mod tests {
                 let buffer = (distance.x - distance.z * depth) / (distance.w * depth - distance.y);
                 assert!((buffer - d).abs() < 1e-6, "{name}: depth {depth} converts to {buffer}, Bevy's value is {d}");
             }
+            let half = CameraLens::of(&projection).and_then(|lens| lens.in_depth_range(&(0.25..0.75)).distance);
+            let half = half.expect("a plain depth");
+            let depth = |d: f32| (half.x + half.y * d) / (half.z + half.w * d);
+            let clip = projection * Vec4::new(0.3, -0.2, -7.5, 1.0);
+            let back = depth(0.25 + 0.5 * clip.z / clip.w);
+            assert!(
+                (back - 7.5).abs() < 1e-3,
+                "{name}: in half of the depth buffer, depth 7.5 converts back to {back}"
+            );
         }
     }
 

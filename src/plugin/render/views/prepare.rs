@@ -423,7 +423,8 @@ fn drawable_lens(view: &ExtractedView, camera: &ExtractedCamera) -> Option<Camer
     if let Some(fault) = fault {
         warn_once_each(&fault.to_string());
     }
-    CameraLens::of(&view.clip_from_view).filter(|_| fault != Some(CameraFault::Oklab))
+    let lens = CameraLens::of(&view.clip_from_view).filter(|_| fault != Some(CameraFault::Oklab))?;
+    Some(camera.viewport.as_ref().map_or(lens, |viewport| lens.in_depth_range(&viewport.depth)))
 }
 
 /// Returns the depth texture of opaque meshes; `None` if it cannot be read.
