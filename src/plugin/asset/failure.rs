@@ -117,7 +117,8 @@ pub enum CaptureFailure {
         /// Its share of the budget, in bytes.
         limit: u64,
     },
-    /// The GPU was lost or refused an object.
+    /// The GPU was lost or refused an object. After a lost device, also a capture of which no copy is in memory, with
+    /// `RenderAssetUsages::RENDER_WORLD`: it must be loaded again.
     #[error("{path}: not drawn: {reason}")]
     Device {
         /// Path of the asset.

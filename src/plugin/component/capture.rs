@@ -69,8 +69,8 @@ impl GaussianCapture {
 
     /// Returns the capture with other usages. With `RenderAssetUsages::RENDER_WORLD` alone, the Gaussians are dropped
     /// from memory once they are on the GPU. Such a capture plays as others do, but [`scene`](Self::scene) has no
-    /// Gaussians then: it can be neither picked nor saved, and after a lost device it must be loaded again. Default:
-    /// both worlds. `MAIN_WORLD` alone counts as both.
+    /// Gaussians then: it can be neither picked nor saved, and after a lost device it fails and must be loaded again.
+    /// Default: both worlds. `MAIN_WORLD` alone counts as both.
     pub fn with_usages(self, usages: RenderAssetUsages) -> Self {
         Self { usages, ..self }
     }

@@ -5,7 +5,7 @@
 
 use super::steering::Steering;
 use crate::plugin::render::statistics::CaptureStatistics;
-use crate::scene::{Bounds, Importances};
+use crate::scene::{Bounds, Importances, RuntimeScene};
 use crate::view::{Thinning, View};
 use bevy::ecs::reflect::ReflectResource;
 use bevy::ecs::resource::Resource;
@@ -114,7 +114,7 @@ impl CaptureCut {
         }
         let pixels = self.steering.pixels();
         // A priority that is negative or not a number is the smallest.
-        let size = pixels_per_unit(view, thinned.bounds) * priority.max(LEAST_PRIORITY);
+        let size = pixels_per_unit(view, thinned.core) * priority.max(LEAST_PRIORITY);
         let wanted = if pixels == 0.0 { 0.0 } else { pixels / size };
         [wanted, thinned.importances.least_of(self.least_share)]
     }
@@ -124,20 +124,31 @@ impl CaptureCut {
 pub(crate) struct ThinnedCapture<'a> {
     /// Of the level of detail that is drawn.
     pub(in crate::plugin::render) importances: &'a Importances,
-    /// Over all times, capture space; `None` if they are not known.
-    pub(in crate::plugin::render) bounds: Option<Bounds>,
+    /// The box around most of its Gaussians, capture space; `None` if it is not known.
+    pub(in crate::plugin::render) core: Option<Bounds>,
+}
+
+/// Most Gaussians in the sample of [`core_of`].
+const SAMPLE: usize = 4096;
+
+/// Returns the box around the middle nine tenths of the means of a capture, of Gaussians at even steps through it:
+/// strays do not count. `None` if it is empty.
+pub(super) fn core_of(scene: &RuntimeScene) -> Option<Bounds> {
+    let count = scene.len().min(SAMPLE);
+    let of_sample = |step: usize| scene.gaussian((step as u64 * scene.len() as u64 / count as u64) as usize);
+    Bounds::core((0..count).map(of_sample))
 }
 
 /// Returns how many pixels a unit of the capture has in a view, at a typical depth.
-fn pixels_per_unit(view: &View, bounds: Option<Bounds>) -> f32 {
+fn pixels_per_unit(view: &View, core: Option<Bounds>) -> f32 {
     let scale = Mat3::from_mat4(view.world_to_camera).determinant().abs().cbrt();
     let focal = 0.5 * view.size.as_vec2() * Vec2::new(view.projection.x, view.projection.y).abs();
     let focal = (focal.x * focal.y).sqrt() * scale;
     if view.orthographic {
         return focal;
     }
-    // A camera inside the capture sees most of it at the distance of its bounds.
-    let (center, radius) = bounds.map_or((Vec3::ZERO, 1.0), |bounds| (bounds.center(), bounds.radius()));
+    // A camera inside the capture sees most of it at the distance of its core.
+    let (center, radius) = core.map_or((Vec3::ZERO, 1.0), |core| (core.center(), core.radius()));
     focal / view.world_to_camera.transform_point3(center).length().hypot(radius * scale)
 }
 
@@ -184,6 +195,7 @@ pub(in crate::plugin::render) fn steer_cut(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gaussian::Harmonics;
     use crate::scene::synth::{SynthSettings, synthesize};
     use crate::view::{Camera, RasterFov};
     use glam::UVec2;
@@ -206,8 +218,8 @@ mod tests {
     fn far_captures_lose_gaussians_first_and_keep_their_smallest_share() {
         let scene = synthesize(&SynthSettings { count: 3000, ..SynthSettings::default() });
         let importances = Importances::of(&scene.into_runtime().expect("it can be drawn"));
-        let bounds = Some(Bounds { min: Vec3::splat(-1.0), max: Vec3::splat(1.0) });
-        let thinned = ThinnedCapture { importances: &importances, bounds };
+        let core = Some(Bounds { min: Vec3::splat(-1.0), max: Vec3::splat(1.0) });
+        let thinned = ThinnedCapture { importances: &importances, core };
         assert!(CaptureCut::default().thinning(&view(5.0), &thinned, 1.0).is_none(), "all Gaussians without a cut");
         let cut = cut(0.5);
         let share = |distance: f32, priority: f32| {
@@ -229,19 +241,32 @@ mod tests {
     #[test]
     fn whether_a_capture_can_be_drawn_with_less_is_known() {
         let importances = Importances::default();
-        let thinned = ThinnedCapture { importances: &importances, bounds: None };
+        let thinned = ThinnedCapture { importances: &importances, core: None };
         let mut cut = cut(0.5);
         cut.seen(&view(4.0), &thinned, 1.0);
         assert!(!*cut.can_fall.get_mut(), "an empty capture has no Gaussians to leave out");
         let scene = synthesize(&SynthSettings { count: 300, ..SynthSettings::default() });
         let importances = Importances::of(&scene.into_runtime().expect("it can be drawn"));
-        let thinned = ThinnedCapture { importances: &importances, bounds: None };
+        let thinned = ThinnedCapture { importances: &importances, core: None };
         cut.seen(&view(0.5), &thinned, f32::INFINITY);
         cut.seen(&view(1e5), &thinned, 1.0);
         cut.thinning(&view(0.5), &thinned, 1.0);
         assert!(!*cut.can_fall.get_mut(), "one of infinite priority, one at its smallest share, one in a shadow");
         cut.seen(&view(0.5), &thinned, 1.0);
         assert!(*cut.can_fall.get_mut(), "a near capture has");
+    }
+
+    #[test]
+    fn strays_do_not_change_the_pixels_of_a_unit() {
+        let scene = synthesize(&SynthSettings { count: 300, ..SynthSettings::default() });
+        let mut scene = scene.into_runtime().expect("it can be drawn");
+        let pixels = |scene: &RuntimeScene| pixels_per_unit(&view(5.0), core_of(scene));
+        let before = pixels(&scene);
+        scene.form.as_sliced_mut().expect("sliced").gaussians[7].mean = [1e4; 3];
+        let after = pixels(&scene);
+        assert!((after / before - 1.0).abs() < 0.05, "{before} pixels, and {after} with a stray Gaussian");
+        let empty = RuntimeScene::sliced(Vec::new(), Harmonics::default());
+        assert_eq!(core_of(&empty), None, "an empty capture has no core");
     }
 
     #[test]

@@ -3,6 +3,7 @@
 //! In: chunk files that have been loaded, of which [`Uploads`] knows the capture. Out: their Gaussians in the pages of the
 //! buffers of that capture, until they are no longer loaded; what is known of all of them.
 
+use super::budget::core_of;
 use crate::plugin::asset::Uploads;
 use crate::plugin::component::GaussianCapture;
 use crate::renderer::device::memory::catch_known;
@@ -135,6 +136,7 @@ struct PlacedFile {
     asset: AssetId<GaussianCapture>,
     gaussians: usize,
     bounds: Option<Bounds>,
+    core: Option<Bounds>,
     importances: Importances,
     is_complete: bool,
 }
@@ -146,10 +148,15 @@ impl PlacedFiles {
         Importances::of_all(complete.map(|file| (file.gaussians, &file.importances)))
     }
 
+    /// Returns the box around most of the Gaussians of complete files; `None` if there is none.
+    pub(super) fn core(&self) -> Option<Bounds> {
+        self.files.values().filter(|file| file.is_complete).filter_map(|file| file.core).reduce(Bounds::union)
+    }
+
     fn place(&mut self, number: usize, asset: AssetId<GaussianCapture>, source: &GaussianCapture) {
         let scene = source.scene();
-        let (bounds, importances) = (source.bounds(), Importances::of(scene));
-        let file = PlacedFile { asset, gaussians: scene.len(), bounds, importances, is_complete: false };
+        let (bounds, core, importances) = (source.bounds(), core_of(scene), Importances::of(scene));
+        let file = PlacedFile { asset, gaussians: scene.len(), bounds, core, importances, is_complete: false };
         self.files.insert(number, file);
     }
 

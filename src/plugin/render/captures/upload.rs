@@ -6,7 +6,7 @@
 //! it, or no view could draw the capture. A chunk file has no buffers of its own: it is uploaded into the pages of the
 //! capture of which it is a file.
 
-use super::budget::ThinnedCapture;
+use super::budget::{ThinnedCapture, core_of};
 use super::chunk_files::{ChunkFile, Destination, PlacedFiles, UploadTarget};
 use crate::plugin::asset::{CaptureFailure, Uploads};
 use crate::plugin::component::GaussianCapture;
@@ -30,6 +30,10 @@ use bevy::render::render_asset::{AssetExtractionError, PrepareAssetError, Render
 use bevy::render::renderer::{RenderDevice, RenderQueue};
 use std::sync::Arc;
 use std::thread::JoinHandle;
+
+/// Why a capture is not uploaded again.
+const WITHOUT_COPY: &str = "its Gaussians must be uploaded again, as after a lost device, and are no longer in memory: \
+                            load the capture again; RenderAssetUsages::default() in CaptureLoaderSettings keeps a copy";
 
 /// The number of bytes of captures that may be uploaded to the GPU in one frame: a resource.
 ///
@@ -76,6 +80,8 @@ struct ShownCapture {
     levels: Vec<GpuCapture>,
     /// Those of each of the levels.
     importances: Vec<Importances>,
+    /// The box around most of the Gaussians; `None` if there is none.
+    core: Option<Bounds>,
     /// The source of these buffers, which may be older than the asset.
     source: GaussianCapture,
     /// The chunk files that are in the pages of the first of the levels.
@@ -91,7 +97,7 @@ impl ShownCapture {
         {
             capture.take_pages(from);
             self.files = before.files;
-            self.importances = before.importances;
+            (self.importances, self.core) = (before.importances, before.core);
         } else {
             before.files.forget(uploads);
         }
@@ -104,12 +110,12 @@ impl ShownCapture {
         most_bytes: u64,
         change: impl FnOnce(&mut GpuCapture, &mut PlacedFiles, &Destination<'_>) -> T,
     ) -> Option<T> {
-        let Self { levels, importances, source, files } = self;
+        let Self { levels, importances, core, source, files } = self;
         let capture = levels.first_mut()?;
         let (before, index) = (capture.len(), &*source);
         let changed = change(capture, files, &Destination { target: *to, index, most_bytes });
         if let Some(importances) = importances.first_mut().filter(|_| capture.len() != before) {
-            *importances = files.importances();
+            (*importances, *core) = (files.importances(), files.core());
         }
         Some(changed)
     }
@@ -120,6 +126,7 @@ struct NextCapture {
     /// All Gaussians, then each level of detail.
     uploads: Vec<CaptureUpload<Arc<RuntimeScene>>>,
     importances: Vec<Importances>,
+    core: Option<Bounds>,
     source: GaussianCapture,
     /// Error scopes of the buffers, without results yet, as in browsers. Nothing is drawn until these arrive.
     pending: Option<Caught>,
@@ -135,7 +142,7 @@ impl NextCapture {
     /// When the GPU refuses a buffer or has no memory for it, or no view can draw the capture.
     fn new(device: &wgpu::Device, renderer: &CaptureRenderer, source: GaussianCapture) -> Result<Self, GpuError> {
         let whole = source.shared_scene();
-        let needed = whole.size() as u64;
+        let (needed, core) = (whole.size() as u64, core_of(&whole));
         let levels = whole.levels.iter().map(|level| level.scene.clone()).collect::<Vec<_>>();
         let importances = std::iter::once(&whole).chain(&levels).map(|scene| Importances::of(scene)).collect();
         let upload = |scene| CaptureUpload::new(device, &renderer.0, scene);
@@ -150,7 +157,7 @@ impl NextCapture {
         let mut rooms = uploads.iter().map(|upload| ViewRenderer::check_room(device, upload.most_drawn()));
         rooms.next_back().unwrap_or(Ok(()))?;
         let passes = renderer.0.begin_ahead(device, Storage::of(&source.scene().form));
-        Ok(Self { uploads, importances, source, pending, passes })
+        Ok(Self { uploads, importances, core, source, pending, passes })
     }
 
     /// Returns whether the capture can be drawn.
@@ -180,9 +187,9 @@ impl GpuGaussianCapture {
 
     /// Returns what decides about the Gaussians that are left out of a level of detail; `None` as for its buffers.
     pub(crate) fn thinned(&self, index: usize) -> Option<ThinnedCapture<'_>> {
-        let ShownCapture { importances, levels, .. } = &**self.shown.as_ref()?;
+        let ShownCapture { importances, core, .. } = &**self.shown.as_ref()?;
         let importances = importances.get(index).or(importances.first())?;
-        Some(ThinnedCapture { importances, bounds: levels.first()?.bounds })
+        Some(ThinnedCapture { importances, core: *core })
     }
 
     /// Returns the levels of detail and the bounds over all times of the drawn capture; `None` if it has no levels.
@@ -245,8 +252,8 @@ impl GpuGaussianCapture {
             if source.usages() == RenderAssetUsages::RENDER_WORLD {
                 source.release();
             }
-            let (importances, files) = (next.importances, PlacedFiles::default());
-            let mut shown = ShownCapture { levels, importances, source, files };
+            let (importances, core, files) = (next.importances, next.core, PlacedFiles::default());
+            let mut shown = ShownCapture { levels, importances, core, source, files };
             if let Some(before) = self.shown.take().and_then(Arc::into_inner) {
                 shown.keep_files(before, uploads);
             }
@@ -286,7 +293,8 @@ impl RenderAsset for GpuGaussianCapture {
         source: &mut GaussianCapture,
         _previous: Option<&Self>,
     ) -> Result<GaussianCapture, AssetExtractionError> {
-        source.release().ok_or(AssetExtractionError::AlreadyExtracted)
+        // Without Gaussians if they have been dropped: the upload then fails, with the reason.
+        Ok(source.release().unwrap_or_else(|| source.clone()))
     }
 
     fn prepare_asset(
@@ -297,6 +305,16 @@ impl RenderAsset for GpuGaussianCapture {
     ) -> Result<Self, PrepareAssetError<GaussianCapture>> {
         let name = || name(assets, id);
         let shown = previous.and_then(|previous| previous.shown.clone());
+        if source.is_released() {
+            // Chunk files are loaded again.
+            if uploads.file_of(id).is_none() {
+                uploads.begin(id, shown.is_some());
+                let failure = CaptureFailure::Device { path: name(), reason: WITHOUT_COPY.to_owned() };
+                error!("{failure}");
+                uploads.fail(id, failure);
+            }
+            return Ok(Self { shown, next: None, file: None });
+        }
         uploads.begin(id, shown.is_some());
         let Some(renderer) = renderer else {
             // The failure has already been logged once for all captures.
