@@ -10,7 +10,7 @@ use crate::support::playback_app::{self, change, get, pass, scene};
 use bevy::ecs::schedule::SingleThreadedExecutor;
 use bevy::mesh::{MeshVertexAttribute, VertexAttributeValues};
 use bevy::prelude::*;
-use bevy_gs4d::playback::{ColliderState, collider_mesh};
+use bevy_gs4d::playback::{Clip, ColliderState, Timeline, TimelinePlayer, TimelineTrack, Track, collider_mesh};
 use bevy_gs4d::prelude::*;
 use bevy_gs4d::scene::{ColliderMesh, ColliderStretch, Colliders, GaussianScene};
 use std::sync::Arc;
@@ -209,6 +209,42 @@ fn the_mesh_goes_with_the_asset_and_with_the_capture() {
     app.world_mut().entity_mut(moving[0]).despawn();
     pass(&mut app, 0.0);
     assert_eq!(messages(&mut app), [""; 0], "entities that are gone have no message");
+}
+
+#[test]
+fn the_mesh_goes_with_its_component() {
+    let mut app = app();
+    let handle = add(&mut app, Some(colliders(10.0)));
+    let pair = spawn(&mut app, &handle, Playback::paused_at(0.75), CaptureCollider::Moving);
+    pass(&mut app, 0.0);
+    messages(&mut app);
+    app.world_mut().entity_mut(pair[1]).remove::<CaptureCollider>();
+    pass(&mut app, 0.0);
+    assert!(app.world().get::<ColliderState>(pair[1]).is_none(), "the state is removed");
+    assert_eq!(messages(&mut app), [message(pair, None)], "a message takes the mesh away");
+    app.world_mut().entity_mut(pair[1]).insert(CaptureCollider::Moving);
+    pass(&mut app, 0.0);
+    assert_eq!(mesh(&app, pair[1]), Some(solid(11.0)), "the mesh is back");
+    assert_eq!(messages(&mut app), [message(pair, Some(1))], "a message brings it back");
+}
+
+#[test]
+fn a_track_is_solid_only_where_it_shows_a_clip() {
+    let mut app = app();
+    let capture = add(&mut app, Some(colliders(10.0)));
+    let clip = Clip { capture, start: 1.0, range: [0.0, 2.0], speed: 1.0, fade: [0.0; 2] };
+    let track = Track { name: "stage".into(), clips: vec![clip] };
+    let timeline = Timeline::new(vec![track], Vec::new(), None).expect("a valid timeline");
+    let timeline = app.world_mut().resource_mut::<Assets<Timeline>>().add(timeline);
+    let player = app.world_mut().spawn((TimelinePlayer(timeline), Playback::paused_at(1.5))).id();
+    let track = app.world_mut().spawn((TimelineTrack("stage".into()), ChildOf(player))).id();
+    let pair = [track, app.world_mut().spawn((CaptureCollider::Standing, ChildOf(track))).id()];
+    for (seconds, expected) in [(1.5, Some(solid(0.0))), (0.5, None), (2.0, Some(solid(0.0)))] {
+        change(&mut app, player, |playback: &mut Playback| playback.seek(seconds));
+        pass(&mut app, 0.0);
+        assert_eq!(mesh(&app, pair[1]), expected, "the mesh at {seconds} s, of a clip that begins at 1 s");
+        assert_eq!(messages(&mut app), [message(pair, None)], "a message tells of it at {seconds} s");
+    }
 }
 
 #[test]

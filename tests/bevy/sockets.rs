@@ -89,7 +89,7 @@ fn a_lost_socket_keeps_the_last_transform_until_it_is_found_again() {
 fn a_socket_that_does_not_exist_is_missing_and_named_once() {
     let mut app = app("assets");
     let own = Transform::from_xyz(1.0, 2.0, 3.0);
-    let [_, foot] = spawn(&mut app, (), (CaptureSocket::new("foot"), own));
+    let [player, foot] = spawn(&mut app, (), (CaptureSocket::new("foot"), own));
     let stray = app.world_mut().spawn(CaptureSocket::new("stray")).id();
     // On this thread, of which the log is read.
     app.edit_schedule(PostUpdate, |schedule| {
@@ -104,6 +104,10 @@ fn a_socket_that_does_not_exist_is_missing_and_named_once() {
         let naming: Vec<_> = said.iter().filter(|text| text.contains(&format!("{name:?}"))).collect();
         assert_eq!(naming.len(), 1, "one warning names {name}: {said:?}");
     }
+    app.world_mut().entity_mut(stray).insert(ChildOf(player));
+    let said = warnings_of(|| (0..3).for_each(|_| pass(&mut app, 0.0)));
+    let naming: Vec<_> = said.iter().filter(|text| text.contains("\"stray\"")).collect();
+    assert!(matches!(naming[..], [text] if text.contains("`gs4d info`")), "the capture has no such socket: {said:?}");
     app.world_mut().entity_mut(foot).insert(CaptureSocket::new("hand"));
     pass(&mut app, 0.0);
     assert_eq!(get::<SocketState>(&app, foot), SocketState::Tracked { error: 0.25 }, "a name that exists is followed");

@@ -4,6 +4,7 @@
 //! ([`ColliderState`]), which entities share; a message when another mesh takes its place; a mesh of Bevy.
 
 use super::component::Playback;
+use super::timeline::TimelineTrack;
 use crate::plugin::asset::send;
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d, StreamedPicture};
 use crate::scene::{ColliderMesh, Colliders};
@@ -15,6 +16,7 @@ use bevy::ecs::entity::Entity;
 use bevy::ecs::event::EntityEvent;
 use bevy::ecs::hierarchy::ChildOf;
 use bevy::ecs::message::{Message, MessageWriter};
+use bevy::ecs::query::{Has, Without};
 use bevy::ecs::reflect::ReflectComponent;
 use bevy::ecs::system::{Commands, Query, Res};
 use bevy::log::{debug_span, warn};
@@ -71,8 +73,8 @@ pub enum CaptureCollider {
     Standing,
 }
 
-/// The mesh of an entity with a [`CaptureCollider`]. The plugin updates it each frame; it counts as changed only if the
-/// mesh is another one.
+/// The mesh of an entity with a [`CaptureCollider`], with which it is removed. The plugin updates it each frame; it
+/// counts as changed only if the mesh is another one.
 #[derive(Component, Reflect, Debug, Default, Clone)]
 #[reflect(Component, Default, Debug, Clone)]
 #[type_path = "bevy_gs4d::playback"]
@@ -86,8 +88,8 @@ pub struct ColliderState {
 }
 
 /// The mesh of a [`CaptureCollider`] is another one: the first one of its capture, that of another stretch of time, one
-/// of a capture that has been loaded again or replaced. Also sent when there is none any more, because the capture or
-/// its asset has been removed.
+/// of a capture that has been loaded again or replaced. Also sent when there is none any more, because the capture,
+/// its asset or the [`CaptureCollider`] has been removed, or its track of a timeline shows no clip.
 ///
 /// Sent in [`PlaybackSystems::Colliders`](super::PlaybackSystems::Colliders). Consecutive stretches may both have no
 /// mesh.
@@ -136,7 +138,8 @@ enum Lack {
 }
 
 impl ColliderState {
-    /// Returns the mesh; `None` until the capture is loaded, and where nothing is solid.
+    /// Returns the mesh; `None` until the capture is loaded, where nothing is solid, and while its track of a timeline
+    /// shows no clip.
     pub fn mesh(&self) -> Option<&ColliderMesh> {
         let Held { colliders, part, .. } = self.held.as_ref()?;
         let mesh = match *part {
@@ -185,26 +188,41 @@ impl Held {
     }
 }
 
-/// Gives each entity with a collider the mesh of the time of its capture.
+/// Gives each entity with a collider the mesh of the time of its capture, and takes it from those without.
 pub(super) fn update_colliders(
     captures: Res<Assets<GaussianCapture>>,
-    players: Query<(Entity, &GaussianCapture3d, &Playback, Option<&StreamedPicture>)>,
+    players: Query<(
+        Entity,
+        &GaussianCapture3d,
+        &Playback,
+        Option<&StreamedPicture>,
+        (Has<TimelineTrack>, &Visibility),
+    )>,
     mut placed: Query<(Entity, &CaptureCollider, Option<&ChildOf>, &mut ColliderState)>,
+    removed: Query<(Entity, &ColliderState), Without<CaptureCollider>>,
     mut commands: Commands,
     mut changes: MessageWriter<CaptureColliderChanged>,
 ) {
     let _span = debug_span!("gs4d/colliders").entered();
+    for (entity, state) in &removed {
+        commands.entity(entity).try_remove::<ColliderState>();
+        if let Some(&Held { capture, .. }) = state.held.as_ref() {
+            send(&mut commands, &mut changes, CaptureColliderChanged { entity, capture, stretch: None });
+        }
+    }
     for (entity, collider, parent, mut state) in &mut placed {
         let player = parent.and_then(|parent| players.get(parent.parent()).ok());
         let found = match player {
             None => Err(Lack::Capture),
-            Some((capture, handle, playback, picture)) => {
+            Some((capture, handle, playback, picture, (is_track, visibility))) => {
                 let held = |loaded: &GaussianCapture| {
                     let is_streamed = loaded.scene().chunks.is_some();
                     let seconds = StreamedPicture::drawn(picture, is_streamed, playback.time);
                     Held::of(capture, *collider, loaded, seconds)
                 };
-                captures.get(&handle.0).map(held).transpose()
+                // A track without a clip at this time hides its entity, which keeps its capture.
+                let is_there = !is_track || *visibility != Visibility::Hidden;
+                captures.get(&handle.0).map(held).transpose().map(|held| held.filter(|_| is_there))
             }
         };
         let lack = found.as_ref().err().copied();

@@ -3,7 +3,7 @@
 //! In: an app with Bevy's `AssetPlugin` and `TimePlugin`. Out: advancing clocks, timelines and captures.
 
 use super::clock::PlaybackClock;
-use super::collider::{CaptureCollider, CaptureColliderChanged, update_colliders};
+use super::collider::{CaptureColliderChanged, ColliderState, update_colliders};
 use super::component::Playback;
 use super::messages::{
     MarkerReached, PlaybackEnded, PlaybackLooped, PlaybackPaused, PlaybackSeeked, PlaybackStarted, SegmentBoundCrossed,
@@ -68,7 +68,7 @@ fn add(app: &mut App) {
                     .run_if(any_with_component::<TimelinePlayer>)
                     .in_set(Timelines),
                 advance_captures.in_set(Advance),
-                update_colliders.run_if(any_with_component::<CaptureCollider>).in_set(Colliders),
+                update_colliders.run_if(any_with_component::<ColliderState>).in_set(Colliders),
             ),
         )
         .add_systems(PostUpdate, place_sockets.run_if(any_with_component::<CaptureSocket>).in_set(Sockets))
@@ -89,7 +89,7 @@ mod tests {
     use crate::plugin::component::GaussianCapture;
     use crate::plugin::playback::clock::FollowsClock;
     use crate::plugin::playback::markers::{Marker, Markers};
-    use crate::plugin::playback::timeline::{Clip, Track};
+    use crate::plugin::playback::timeline::{Clip, TimelineTrack, Track};
     use crate::scene::synth::{SynthSettings, synthesize};
     use bevy::MinimalPlugins;
     use bevy::asset::{AssetPlugin, AssetServer, Assets, Handle};
@@ -97,7 +97,7 @@ mod tests {
     use bevy::ecs::entity::Entity;
     use bevy::ecs::observer::On;
     use bevy::ecs::resource::Resource;
-    use bevy::ecs::system::ResMut;
+    use bevy::ecs::system::{Commands, ResMut};
     use bevy::time::TimeUpdateStrategy;
     use std::io;
     use std::sync::mpsc;
@@ -213,6 +213,19 @@ mod tests {
         pass(&mut app, 1);
         assert_eq!(time(&app, player), 0.25, "the timeline advances once all captures are uploaded");
         assert_eq!(reached(&app), ["start"], "the marker at the start is reached");
+    }
+
+    #[test]
+    fn a_timeline_that_is_despawned_in_its_first_frame_leaves_no_track() {
+        let (mut app, _) = app();
+        let capture = capture(&mut app);
+        let player = spawn_timeline(&mut app, &[&capture]);
+        let despawn = move |mut commands: Commands| commands.entity(player).try_despawn();
+        // The player is there when its tracks are requested.
+        app.add_systems(Update, despawn.before_ignore_deferred(PlaybackSystems::Timelines));
+        pass(&mut app, 1);
+        let mut tracks = app.world_mut().query::<&TimelineTrack>();
+        assert_eq!(tracks.iter(app.world()).count(), 0, "no entity of a track is left");
     }
 
     #[test]

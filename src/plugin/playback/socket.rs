@@ -48,7 +48,7 @@ use glam::{Quat, Vec3};
 #[derive(Component, Reflect, Debug, Default, Clone, PartialEq, Eq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
 #[type_path = "bevy_gs4d::playback"]
-#[require(Transform, Visibility, SocketState)]
+#[require(Transform, Visibility, SocketState, WarnedOf)]
 pub struct CaptureSocket(pub String);
 
 impl CaptureSocket {
@@ -77,6 +77,10 @@ pub enum SocketState {
     Missing,
 }
 
+/// What has been warned of an entity with a [`CaptureSocket`].
+#[derive(Component, Debug, Default)]
+pub(super) struct WarnedOf(Option<Lack>);
+
 /// Why a socket is missing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Lack {
@@ -88,10 +92,10 @@ enum Lack {
 pub(super) fn place_sockets(
     captures: Res<Assets<GaussianCapture>>,
     players: Query<(&GaussianCapture3d, &Playback, Option<&StreamedPicture>)>,
-    mut placed: Query<(Entity, &CaptureSocket, Option<&ChildOf>, &mut Transform, &mut SocketState)>,
+    mut placed: Query<(Entity, &CaptureSocket, Option<&ChildOf>, &mut Transform, &mut SocketState, &mut WarnedOf)>,
 ) {
     let _span = debug_span!("gs4d/sockets").entered();
-    for (entity, CaptureSocket(name), parent, mut transform, mut state) in &mut placed {
+    for (entity, CaptureSocket(name), parent, mut transform, mut state, mut warned) in &mut placed {
         let player = parent.and_then(|parent| players.get(parent.parent()).ok());
         let seen = |(handle, playback, picture): (&GaussianCapture3d, &Playback, Option<&StreamedPicture>)| {
             let capture = captures.get(&handle.0);
@@ -111,18 +115,19 @@ pub(super) fn place_sockets(
                 }
             }),
         };
-        if let Err(lack) = found
-            && *state != SocketState::Missing
-        {
+        let lack = found.err();
+        if lack != warned.0 {
+            warned.0 = lack;
             match lack {
-                Lack::Capture => warn!(
+                Some(Lack::Capture) => warn!(
                     "{entity} has a CaptureSocket({name:?}) and is not the child of an entity with a \
                      GaussianCapture3d, so that it stays where it is: spawn it as a child of the capture"
                 ),
-                Lack::Name => warn!(
+                Some(Lack::Name) => warn!(
                     "{entity} has a CaptureSocket({name:?}), and the capture has no socket of that name, so that it \
                      stays where it is: `gs4d info` lists sockets, `gs4d socket` places them"
                 ),
+                None => {}
             }
         }
         state.set_if_neq(found.unwrap_or(SocketState::Missing));

@@ -75,8 +75,18 @@ pub struct SoundState {
     volume: f32,
     /// The number of jumps of the player; `None` before its first time.
     jumps: Option<u32>,
-    /// Whether there has been a warning of a sound that is missing.
-    pub(super) is_warned: bool,
+    /// What has been warned of last.
+    #[reflect(ignore)]
+    pub(super) lack: Option<Lack>,
+}
+
+/// Why nothing is heard of a [`CaptureSound`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Lack {
+    /// Its entity has no capture.
+    Capture,
+    /// It has no track, and its capture no sound.
+    Sound,
 }
 
 /// The time of a player in a frame.
@@ -134,7 +144,7 @@ impl SoundState {
 
     /// Makes the sound silent: there is no player, or no time.
     pub(super) fn rest(&mut self) {
-        *self = Self { is_warned: self.is_warned, ..Self::default() };
+        *self = Self { lack: self.lack, ..Self::default() };
     }
 }
 

@@ -19,6 +19,7 @@ use bevy::ecs::hierarchy::ChildOf;
 use bevy::ecs::query::{Has, With};
 use bevy::ecs::schedule::IntoScheduleConfigs;
 use bevy::ecs::system::{Commands, Local, Query, ResMut};
+use bevy::ecs::world::EntityWorldMut;
 use bevy::log::warn;
 use bevy::platform::time::Instant;
 use bevy::reflect::TypePath;
@@ -79,8 +80,12 @@ fn hear(
             _ if is_played => {
                 let shared = Arc::new(Mutex::new(cue));
                 let player = AudioPlayer(sounds.add(FollowedSound(shared.clone(), began)));
-                let child = commands.spawn((player, ChildOf(entity))).id();
-                commands.entity(entity).try_insert(Followed { cue: shared, child });
+                // Another system may despawn the entity before.
+                commands.entity(entity).queue_silenced(move |mut entity: EntityWorldMut| {
+                    let parent = ChildOf(entity.id());
+                    let child = entity.world_scope(|world| world.spawn((player, parent)).id());
+                    entity.insert(Followed { cue: shared, child });
+                });
             }
             _ => {}
         }

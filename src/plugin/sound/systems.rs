@@ -3,7 +3,7 @@
 //! In: players of timelines with sounds, entities with a [`CaptureSound`], their times. Out: an entity for each sound
 //! of a timeline; the [`SoundState`] of every sound.
 
-use super::component::{CaptureSound, Heard, SoundState, TimelineSound};
+use super::component::{CaptureSound, Heard, Lack, SoundState, TimelineSound};
 use super::decoding::DecodedSounds;
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d, SoundTrack};
 use crate::plugin::playback::{Playback, PlaybackClock, PlaybackState, Timeline, TimelinePlayer};
@@ -13,10 +13,10 @@ use bevy::ecs::hierarchy::{ChildOf, Children};
 use bevy::ecs::query::Without;
 use bevy::ecs::schedule::SystemSet;
 use bevy::ecs::system::{Commands, Query, Res, ResMut};
+use bevy::ecs::world::EntityWorldMut;
 use bevy::log::{debug_span, warn};
 use bevy::time::{Real, Time};
 use std::collections::HashSet;
-use std::mem::replace;
 
 /// The set of the systems that update sounds: in `Update`, after
 /// [`PlaybackSystems::Advance`](crate::playback::PlaybackSystems::Advance).
@@ -41,7 +41,10 @@ pub(super) fn bind_sounds(
             }
         }
         for index in (0..count).filter(|index| !found.contains(index)) {
-            commands.spawn((TimelineSound(index), ChildOf(player)));
+            // Another system may despawn the player before.
+            commands.entity(player).queue_silenced(move |mut player: EntityWorldMut| {
+                player.with_child(TimelineSound(index));
+            });
         }
     }
 }
@@ -94,6 +97,7 @@ pub(super) fn follow_captures(
             if handle.is_none() {
                 warn_once(
                     &mut state,
+                    Lack::Capture,
                     &format!(
                         "{entity} has a CaptureSound and no GaussianCapture3d, so that nothing is heard: insert both on one \
                      entity"
@@ -112,6 +116,7 @@ pub(super) fn follow_captures(
             Some(_) => _ = kept.insert(id),
             None if sound.track.is_none() => warn_once(
                 &mut state,
+                Lack::Sound,
                 &format!(
                     "{entity} has a CaptureSound without a track, and its capture carries no sound, so that nothing is heard: \
                  `gs4d sound` puts one into a package; a capture in chunk files needs a track"
@@ -133,9 +138,9 @@ pub(super) fn rest_removed(mut removed: Query<&mut SoundState, (Without<CaptureS
     }
 }
 
-/// Logs a warning about a sound, unless there has been one.
-fn warn_once(state: &mut SoundState, warning: &str) {
-    if !replace(&mut state.is_warned, true) {
+/// Logs a warning of what a sound lacks, unless the last one was of the same.
+fn warn_once(state: &mut SoundState, lack: Lack, warning: &str) {
+    if state.lack.replace(lack) != Some(lack) {
         warn!("{warning}");
     }
 }

@@ -19,9 +19,10 @@ use bevy::asset::{AssetServer, Assets, LoadState, UntypedAssetId};
 use bevy::camera::visibility::Visibility;
 use bevy::ecs::change_detection::{DetectChangesMut, Mut};
 use bevy::ecs::entity::Entity;
-use bevy::ecs::hierarchy::{ChildOf, Children};
+use bevy::ecs::hierarchy::Children;
 use bevy::ecs::query::{With, Without};
 use bevy::ecs::system::{Commands, Query, Res};
+use bevy::ecs::world::EntityWorldMut;
 use bevy::log::debug_span;
 use bevy::time::Time;
 
@@ -44,7 +45,11 @@ pub(in crate::plugin::playback) fn bind_tracks(
         for track in timeline.tracks() {
             let plays = |child: &Entity| tracks.get(*child).is_ok_and(|(name, _)| name.0 == track.name);
             if !children.iter().any(plays) {
-                commands.spawn((TimelineTrack(track.name.clone()), follows, ChildOf(player)));
+                let track = (TimelineTrack(track.name.clone()), follows);
+                // Another system may despawn the player before.
+                commands.entity(player).queue_silenced(move |mut player: EntityWorldMut| {
+                    player.with_child(track);
+                });
             }
         }
     }
