@@ -4,7 +4,7 @@
 //! drawn, with what is known of the Gaussians of that time; [`CaptureStreamState`]; messages. The render world draws those
 //! Gaussians of the files that are there.
 
-use super::heads::playhead;
+use super::heads::{Leaders, playhead};
 use super::messages::Announcer;
 use super::settings::{CaptureStreamSettings, OnUnderrun};
 use super::state::CaptureStreamState;
@@ -98,6 +98,7 @@ pub(super) fn show_pictures(
     uploads: Res<Uploads>,
     mut placed: Query<Shown>,
     playing: Query<&Playback>,
+    leaders: Leaders,
     mut commands: Commands,
     mut announcer: Announcer,
 ) {
@@ -139,6 +140,7 @@ pub(super) fn show_pictures(
         }
         stall.set_if_neq(Stall { waits, holds_timeline });
         picture.set_if_neq(showing.picture(stream, index, &captures));
+        let head = playhead(&playback, leaders.speed(entity), index.duration_seconds());
         state.set_if_neq(CaptureStreamState {
             seconds: showing.shown,
             needed: coverage.files,
@@ -146,7 +148,7 @@ pub(super) fn show_pictures(
             share: coverage.share(),
             is_coarse: coverage.is_coarse,
             retries: schedule.needed_at(playback.time.into()).filter(|file| schedule.waits(*file)).count(),
-            buffered_seconds: schedule.buffered(&playhead(&playback, index.duration_seconds())) as f32,
+            buffered_seconds: schedule.buffered(&head) as f32,
             requests: schedule.requested(),
             gpu_bytes: schedule.gpu_bytes(),
             host_bytes: schedule.host_bytes(),

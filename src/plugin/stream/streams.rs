@@ -5,7 +5,7 @@
 //! server loads files with their first handle, and frees them with their last.
 
 use super::faults::{fault, without_folder};
-use super::heads::playhead;
+use super::heads::{Leaders, playhead};
 use super::settings::{CaptureStreamSettings, StreamBudget};
 use super::shares::{OnTheWay, Sight, ask_in_turns, shares};
 use super::state::CaptureStreamState;
@@ -19,6 +19,7 @@ use bevy::asset::{AssetId, AssetPath, AssetServer, Assets, Handle, RenderAssetUs
 use bevy::camera::Camera;
 use bevy::camera::visibility::ViewVisibility;
 use bevy::ecs::change_detection::DetectChanges;
+use bevy::ecs::entity::Entity;
 use bevy::ecs::resource::Resource;
 use bevy::ecs::system::{Query, Res, ResMut};
 use bevy::log::debug_span;
@@ -240,6 +241,7 @@ fn path_beside(index: &AssetPath<'_>, file: usize, of: usize) -> AssetPath<'stat
 
 /// What is known of an entity whose capture may be in chunk files.
 type Placed = (
+    Entity,
     &'static GaussianCapture3d,
     &'static Playback,
     &'static GlobalTransform,
@@ -255,6 +257,7 @@ pub(super) fn fetch_files(
     uploads: Res<Uploads>,
     budget: Res<StreamBudget>,
     placed: Query<Placed>,
+    leaders: Leaders,
     tracks: Query<(&NextClip, &GlobalTransform)>,
     cameras: Query<(&Camera, &GlobalTransform)>,
     device: Option<Res<RenderDevice>>,
@@ -268,7 +271,7 @@ pub(super) fn fetch_files(
     let mut wanted: BTreeMap<AssetId<GaussianCapture>, (Vec<Playhead>, Sight)> = BTreeMap::new();
     let eyes: Vec<Vec3> =
         cameras.iter().filter(|(camera, _)| camera.is_active).map(|(_, place)| place.translation()).collect();
-    for (handle, playback, place, visibility, settings, state) in &placed {
+    for (entity, handle, playback, place, visibility, settings, state) in &placed {
         let id = handle.0.id();
         let Some(capture) = captures.get(id) else { continue };
         if !streams.begin(id, capture, &server, is_device_new) {
@@ -276,7 +279,7 @@ pub(super) fn fetch_files(
             continue;
         }
         let (heads, sight) = wanted.entry(id).or_default();
-        heads.push(playhead(playback, capture.duration_seconds()));
+        heads.push(playhead(playback, leaders.speed(entity), capture.duration_seconds()));
         // The picture that stays needs its files.
         let held = state.filter(|state| !state.is_coarse).and_then(|state| state.seconds);
         let preload = settings.iter().flat_map(|settings| settings.preload.iter().copied());
