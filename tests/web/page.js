@@ -94,11 +94,11 @@ async function loading() {
   await post('loading', { slices, draws, pictures, parts: had('progress').length, long: inside.seen.long });
   const bytes = new Uint8Array(await (await fetch('/page/toybox.gs4d')).arrayBuffer());
   const sizes = [];
-  for (let i = 0; i < 5; i++) {
+  for (let i = 0; i < 10; i++) {
     await page.openBytes('toybox.gs4d', bytes.slice());
     sizes.push(page.times.memory());
   }
-  await post('memory', sizes);
+  await post('memory', { bytes: bytes.length, sizes });
   await files(player);
   await player.close('loading');
 }
@@ -351,6 +351,12 @@ async function faults() {
   inside.document.body.dispatchEvent(new inside.DragEvent('drop', { dataTransfer, bubbles: true, cancelable: true }));
   await until('the files of this device', () => had('loaded').length > before && page.thereShare === 1);
   results['the files of a folder can be dropped together'] = had('error').length === 3;
+  page.player.receive_file = () => {
+    throw new inside.WebAssembly.RuntimeError('unreachable');
+  };
+  page.openAddress('/take/index.gs4d');
+  await until('a message', () => had('error').length === 4);
+  results['a page that runs out of memory while files arrive says so'] = at('text').textContent.includes('out of memory');
   inside.seen.console = inside.seen.console.filter((text) => !/503|404/.test(text));
   await post('faults', results);
   await player.close('faults');

@@ -5,6 +5,7 @@
 import { createServer } from 'node:http';
 import { createRequire } from 'node:module';
 import { readFile } from 'node:fs/promises';
+import { gzipSync } from 'node:zlib';
 import { join, resolve } from 'node:path';
 
 const [folder, modules, program, shots] = process.argv.slice(2);
@@ -79,8 +80,15 @@ const server = createServer(async (request, response) => {
     response.writeHead(404).end();
   }
 });
+// Answers of another origin, compressed: longer and shorter than the file.
+const coded = { '/coded.gs4d': gzipSync(toybox, { level: 0 }), '/zeros.gs4d': gzipSync(Buffer.alloc(200_000)) };
 // The same files for pages of other origins: without the header that allows it.
-const other = createServer((request, response) => response.end(toybox));
+const other = createServer((request, response) => {
+  const body = coded[request.url];
+  if (!body) return response.end(toybox);
+  response.writeHead(200, { 'Access-Control-Allow-Origin': '*', 'Content-Encoding': 'gzip', 'Content-Length': body.length });
+  response.end(body);
+});
 const listen = (one) => new Promise((done) => one.listen(0, '127.0.0.1', () => done(`http://127.0.0.1:${one.address().port}`)));
 const [origin, foreign] = [await listen(server), await listen(other)];
 
@@ -229,7 +237,7 @@ await visit('phone', 'autoplay=0', async ({ page, check, until }) => {
 
 // Failures -------------------------------------------------------------------------------------------------------------
 
-await visit('failures', 'autoplay=1', async ({ page, check, had, until, shot }) => {
+await visit('failures', 'autoplay=1&title=First', async ({ page, check, had, until, shot }) => {
   await until('picture');
   const fails = async (address) => {
     const before = (await had('error')).length;
@@ -260,10 +268,24 @@ await visit('failures', 'autoplay=1', async ({ page, check, had, until, shot }) 
   check('a page in place of a file is named so', said.includes('web page'), said);
   said = await fails('junk.gs4d');
   check('junk is no known format', said.includes('neither'), said);
+  await fails(`${foreign}/zeros.gs4d`);
+  const received = (await had('progress')).filter((one) => one.name === 'zeros.gs4d' && one.bytes > 0);
+  check('no more bytes are received than there are', received.length > 0 && received.every((one) => !one.total || one.bytes <= one.total), received);
   const before = (await had('loaded')).length;
-  await page.evaluate(() => void gs4d.openAddress('toybox.gs4d'));
+  await page.evaluate((address) => void gs4d.openAddress(address), `${foreign}/coded.gs4d`);
+  // A compressed answer may be longer than the file.
   await until('loaded', before + 1);
   check('what is opened after a failure plays', await page.evaluate(() => gs4d.playing));
+  const link = new URL(await page.evaluate(() => gs4d.link())).searchParams;
+  check('a link to another capture has not the title of the first', link.get('capture') === `${foreign}/coded.gs4d` && !link.has('title'), link.toString());
+  await page.evaluate(() => {
+    gs4d.player.step = () => {
+      throw new WebAssembly.RuntimeError('unreachable');
+    };
+  });
+  said = await fails('toybox.gs4d');
+  check('a page without memory says so, and the remedy', said.includes('toybox.gs4d') && said.includes('out of memory') && said.includes('gs4d compress'), said);
+  check('and can be loaded again', (await page.locator('#again').isVisible()) && (await text(page, 'again')) === 'Load the page again');
 });
 
 await visit('failures', 'capture=nothing.gs4d', async ({ page, check, until }) => {
@@ -304,12 +326,12 @@ await visit('failures', '', async ({ page, check, until, shot }) => {
 
 // Links ----------------------------------------------------------------------------------------------------------------
 
-await visit('links', 'time=1.5&camera=1,0.4,6,0,0,0.5&scale=0.5&loop=0&controls=1&poster=poster.jpg&speed=2', async ({ page, check, until }) => {
+await visit('links', 'time=1.5&camera=1,0.4,6,0,0,0.5&scale=0.5&loop=0&controls=1&poster=poster.jpg&speed=2&title=Dancer', async ({ page, check, until }) => {
   await until('picture');
   check('a link to a view shows no poster of another one', await page.locator('#poster').isHidden());
   check('the view of the link is shown', (await seconds(page)) === 1.5 && !(await page.evaluate(() => gs4d.playing)));
   const query = new URL(await page.evaluate(() => gs4d.link())).searchParams;
-  for (const [name, value] of Object.entries({ scale: '0.5', loop: '0', controls: '1', poster: 'poster.jpg', speed: '2', time: '1.500', camera: '1,0.4,6,0,0,0.5' })) {
+  for (const [name, value] of Object.entries({ scale: '0.5', loop: '0', controls: '1', poster: 'poster.jpg', speed: '2', title: 'Dancer', time: '1.500', camera: '1,0.4,6,0,0,0.5' })) {
     check(`a copied link keeps ${name}`, query.get(name) === value, query.get(name));
   }
 });
@@ -418,6 +440,16 @@ await visit('waiting', '', async ({ page, check, had, until }) => {
   await page.waitForFunction((small) => gs4d.share > small * 1.5, small, { timeout: 40000 });
   check('a paused picture gets sharper', true);
   check('a paused picture has all Gaussians', (await page.evaluate(() => gs4d.gaussians)) === 1);
+  // Frames of 1/30 s, as of a phone that saves power: after a slow picture, those that take two frames, then one.
+  const shares = await page.evaluate(() => {
+    const quality = new gs4d.quality.constructor();
+    return [200, 66, 33].map((milliseconds) => {
+      for (let i = 0; i < (milliseconds > 90 ? 1 : 100); i++) quality.learn(milliseconds, quality.share(true), true, 1000 / 30);
+      return quality.share(true);
+    });
+  });
+  check('pictures of two frames stay small at 30 frames a second', shares[0] < 1 && shares[1] === shares[0], shares);
+  check('pictures of one frame become large again at 30 frames a second', shares[2] === 1, shares);
 }, { size: [1280, 720], hooks: "window.long = []; new PerformanceObserver((list) => long.push(...list.getEntries())).observe({ entryTypes: ['longtask'] });" });
 
 // Slow links -----------------------------------------------------------------------------------------------------------

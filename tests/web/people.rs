@@ -105,7 +105,7 @@ fn failures_are_told_apart_and_leave_the_capture() {
 
 #[test]
 fn links_keep_what_they_were_opened_with() {
-    check("links", 9);
+    check("links", 10);
 }
 
 #[test]
@@ -120,7 +120,7 @@ fn a_frame_without_a_height_is_no_error() {
 
 #[test]
 fn a_slow_device_plays_at_low_resolution_and_rests_at_full_resolution() {
-    check("waiting", 7);
+    check("waiting", 10);
     if let Some(found) = found() {
         println!("{}", found["figures"]);
     }

@@ -51,7 +51,11 @@ export function linkTo(query, { source, seconds, camera, speed, background }) {
   const address = new URL(location.href);
   const values = new URLSearchParams(query);
   const set = (name, value) => (value === null ? values.delete(name) : values.set(name, value));
-  if (source !== undefined) set('capture', source);
+  if (source !== undefined) {
+    set('capture', source);
+    // The title is that of the capture of the query.
+    set('title', null);
+  }
   set('time', seconds === null ? null : seconds.toFixed(3));
   set('camera', camera);
   set('speed', speed === 1 ? null : String(speed));

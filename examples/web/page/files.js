@@ -49,7 +49,8 @@ async function unanswered(url, signal) {
     : `${url.host} does not answer: the address may be wrong, or the server is down`;
 }
 
-// Asks for an address. Returns the stream of the file, its length, 0 if it is not known, what gives parts of it, and the address.
+// Asks for an address. Returns the stream of the file, its length, 0 if it is not known, whether that length is sure, what gives parts of it, and the
+// address.
 export async function request(address, signal) {
   let url;
   try {
@@ -65,7 +66,8 @@ export async function request(address, signal) {
   if (!response.ok) throw new Refusal(`${address} was not loaded: the server answered ${response.status} ${response.statusText}.`, true);
   // The length of a compressed answer is not that of the file.
   const length = response.headers.has('Content-Encoding') ? 0 : Number(response.headers.get('Content-Length')) || 0;
-  return { stream: response.body, length, parts: (signal) => partsAt(url, signal), address: url };
+  // Other servers hide whether their answers are compressed.
+  return { stream: response.body, length, isSure: response.type !== 'cors', parts: (signal) => partsAt(url, signal), address: url };
 }
 
 // What a beginning shows a file to be that is certainly none of a capture.
@@ -77,10 +79,10 @@ function misnomer(bytes) {
 
 // Opens files in a player, one at a time: a file replaces one that is still being opened.
 export class Opener {
-  // `report` gets the progress; `times.longestSlice` is kept.
-  constructor(player, times, report) {
+  // `report` gets the progress; `times.longestSlice` is kept; `explain` says what an error is about.
+  constructor(player, times, report, explain) {
     // `lacksParts` is the server that sent all of a file because it sends no parts.
-    Object.assign(this, { player, times, report, own: null, stream: null, lacksParts: '' });
+    Object.assign(this, { player, times, report, explain, own: null, stream: null, lacksParts: '' });
   }
 
   // Ends what is being opened.
@@ -137,14 +139,16 @@ export class Opener {
       return Boolean(found);
     } catch (error) {
       if (own.signal.aborted) return false;
-      throw error instanceof Refusal ? error : new Refusal(`${name} was not opened: ${typeof error === 'string' ? error : (error?.message ?? error)}`);
+      throw error instanceof Refusal ? error : new Refusal(`${name} was not opened: ${this.explain(error)}`);
     } finally {
+      // What has not been received of a file that was refused is received no further.
+      own.abort();
       if (this.own === own) this.end();
     }
   }
 
   // Receives a file. Of an index that chunk files follow, only the index where there are parts of the file: then these are returned.
-  async receive(name, { stream, length, parts, address }, signal, preview) {
+  async receive(name, { stream, length, isSure = true, parts, address }, signal, preview) {
     // Whether there are parts, once they are needed.
     let within = null;
     const reader = stream.getReader();
@@ -170,6 +174,8 @@ export class Opener {
       if (wrong) throw new Refusal(`${name} ${wrong}.`);
       this.slice(() => this.player.receive(value));
       received += value.length;
+      // That of a compressed answer is not the length of the file.
+      if (received > length && !isSure) length = 0;
       const index = this.player.index_length?.();
       if (index !== undefined) within ??= parts(signal).catch((error) => error);
       if (received >= index) {
@@ -187,13 +193,16 @@ export class Opener {
       // A file of unknown length may take as long again.
       const left = length ? waited * (length / received - 1) : waited;
       if (left < PATIENT || !this.slice(() => this.player.begin_preview?.())) continue;
-      // What is wrong with a beginning is told when all of the file has been received.
-      const found = await this.steps(() => this.player.step_preview(), signal).catch(() => null);
+      const found = await this.steps(() => this.player.step_preview(), signal).catch((error) => {
+        // What is wrong with a beginning is told when all of the file has been received, by a player that has not ended.
+        if (error instanceof WebAssembly.RuntimeError) throw error;
+        return null;
+      });
       if (signal.aborted) return;
       if (found) preview(found);
     }
     if (received === 0) throw new Refusal(`${name} is empty: it has no byte.`);
-    if (received < length) throw cut();
+    if (received < length && isSure) throw cut();
   }
 
   read(name, signal, beside, seconds) {
@@ -217,7 +226,7 @@ export class Opener {
     if (obstacle) throw new Refusal(`${name} was not opened: ${obstacle}.`, true);
   }
 
-  // Does steps until one has a result, and returns it; null if that was cancelled. `between` is called after each slice.
+  // Does steps until one has a result, and returns it; null if that was cancelled. `between` is called before each further slice.
   async steps(step, signal, between = () => {}) {
     for (;;) {
       const found = this.slice((hasTime) => {
@@ -227,9 +236,9 @@ export class Opener {
         return result;
       });
       if (found) return found;
-      between();
       await (this.player.waits() ? new Promise((resolve) => setTimeout(resolve, this.stream ? 15 : 1)) : pause());
       if (signal.aborted) return null;
+      between();
     }
   }
 }

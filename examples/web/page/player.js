@@ -22,6 +22,9 @@ const SPEEDS = [0.25, 0.5, 1, 2, 4];
 const BACKGROUNDS = { trained: null, black: [0, 0, 0], gray: [0.5, 0.5, 0.5], white: [1, 1, 1] };
 const WITHOUT =
   'This browser has no WebGPU, which draws the capture. Chrome and Edge have it since version 113 (on Android 121), Safari since 26, Firefox since 141 on Windows and 145 on Macs. It may be switched off, or the graphics driver may be too old.';
+const FULL =
+  'the page has run out of memory: make the capture smaller (gs4d compress), or cut it into chunk files (gs4d split), of which the page keeps some';
+const RELOAD = { again: 'Load the page again', action: () => location.reload() };
 const calm = matchMedia('(prefers-reduced-motion: reduce)').matches;
 
 let player = null;
@@ -51,6 +54,9 @@ let quality = new Quality();
 let drawn = null;
 let told = 0;
 let moved = 0;
+// Why the code of the player has ended, after which it answers no call; and what gives the message of its panic, if it was one.
+let ended = '';
+let panicMessage = () => undefined;
 const held = new Set();
 const loops = query.get('loop') !== '0';
 // Milliseconds that the page was blocked at most, by a slice of loading and by a picture; and when the code was compiled.
@@ -61,7 +67,14 @@ function fail(text, options = {}) {
   tell('error', { message: text });
 }
 
-const message = (error) => (typeof error === 'string' ? error : (error?.message ?? String(error)));
+// Says what an error is about, and notes that the code of the player has ended.
+function explain(error) {
+  const text = typeof error === 'string' ? error : (error?.message ?? String(error));
+  if (!(error instanceof WebAssembly.RuntimeError)) return text;
+  // Without memory the code ends without a message.
+  ended ||= panicMessage() ?? (/unreachable/i.test(text) ? FULL : text);
+  return ended;
+}
 
 // Playback -------------------------------------------------------------------------------------------------------------
 
@@ -148,8 +161,8 @@ function notice() {
 // Fetches the files of a capture in chunk files. Until the most important Gaussians of a time are there, the picture of before stays.
 function follow() {
   if (!stream) return;
-  stream.follow(seconds, playing ? speed() : 0, loops);
   try {
+    stream.follow(seconds, playing ? speed() : 0, loops);
     if (stream.work()) changed = true;
   } catch (error) {
     stream.end();
@@ -157,7 +170,8 @@ function follow() {
     if (buffering) tell('buffered', { seconds });
     buffering = false;
     play(false);
-    return fail(`${name} is not played any further: ${message(error)}`, { closable: true });
+    const reason = explain(error);
+    return fail(`${name} is not played any further: ${reason}`, ended ? RELOAD : { closable: true });
   }
   const waits = !stream.has(seconds);
   if (waits !== buffering) {
@@ -180,8 +194,10 @@ function flight() {
 
 // One frame: the time advances whether the device is ready for a picture or not.
 function frame(now) {
+  if (ended) return;
   requestAnimationFrame(frame);
-  const passed = Math.min(now - before, 250) / 1000;
+  const interval = Math.min(now - before, 250);
+  const passed = interval / 1000;
   before = now;
   if (drawnDensity !== devicePixelRatio) [drawnDensity, changed] = [devicePixelRatio, true];
   if (!player || !about) return;
@@ -194,18 +210,18 @@ function frame(now) {
   const fault = player.fault();
   if (fault) {
     play(false);
-    fail(fault, { again: 'Load the page again', action: () => location.reload() });
+    fail(fault, RELOAD);
   }
   if (!player.is_ready()) return;
-  finish(now);
+  finish(now, interval);
   const moves = playing || now - moved < 200;
   if (changed || (pictured === true && !moves && drawn && player.resize && quality.sharper(drawn))) draw(moves);
 }
 
-// The device has finished a picture.
-function finish(now) {
+// The device has finished a picture. `interval` is the time since the frame before, milliseconds.
+function finish(now, interval) {
   if (drawn?.start) {
-    if (drawn.learns) quality.learn(now - drawn.start, drawn.share, drawn.moves);
+    if (drawn.learns) quality.learn(now - drawn.start, drawn.share, drawn.moves, interval);
     // A small picture whose time tells nothing is followed by one that tells how much larger the next may be.
     else changed ||= drawn.share < 1;
     drawn.start = 0;
@@ -240,7 +256,7 @@ function draw(moves) {
     pictured ||= 'drawn';
   } catch (error) {
     play(false);
-    fail(message(error), { again: 'Load the page again', action: () => location.reload() });
+    fail(explain(error), RELOAD);
   }
 }
 
@@ -275,6 +291,7 @@ let partial = null;
 // Opens a file; `near` gives files beside it, if there are any. Returns whether it is shown; what was shown, perhaps its beginning, stays if it is not.
 async function open(title, begin, again, address, near = null) {
   if (!player) return fail(WITHOUT), false;
+  if (ended) return fail(ended, RELOAD), false;
   dismiss();
   // Whether the beginning of the file is shown.
   let begun = Boolean(again) && partial?.title === title && partial.address === address;
@@ -295,7 +312,8 @@ async function open(title, begin, again, address, near = null) {
     return await opener.open(title, begin, { preview, shown, beside: near, seconds: address === undefined ? timeOfLink() ?? 0 : 0 });
   } catch (error) {
     const action = error instanceof Refusal && error.again ? again : null;
-    fail(message(error), { again: action ? 'Try again' : '', action, closable: Boolean(about) || !action });
+    if (ended) play(false);
+    fail(explain(error), ended ? RELOAD : { again: action ? 'Try again' : '', action, closable: Boolean(about) || !action });
     return false;
   }
 }
@@ -581,8 +599,9 @@ async function begin() {
   if (!adapter) return fail(WITHOUT);
   const engine = query.get('engine') === 'bevy' ? 'player_bevy' : 'player_plain';
   try {
-    const { default: init, Player } = await import(`./${engine}.js`);
+    const { default: init, Player, panic_message } = await import(`./${engine}.js`);
     const { memory } = await init();
+    panicMessage = panic_message;
     times.memory = () => memory.buffer.byteLength;
     times.compiled = performance.now();
     const isSoftware = Boolean(adapter.info?.isFallbackAdapter);
@@ -597,9 +616,9 @@ async function begin() {
     if (design) player.set_design?.(design);
     player.set_detail?.(Number(query.get('detail')) || 0);
   } catch (error) {
-    return fail(`The player did not start: ${message(error)}`, { again: 'Load the page again', action: () => location.reload() });
+    return fail(`The player did not start: ${explain(error)}`, RELOAD);
   }
-  opener = new Opener(player, times, report);
+  opener = new Opener(player, times, report, explain);
   listen();
   requestAnimationFrame(frame);
   if (query.has('background') && !setBackground(query.get('background'))) say('The background of the link is not understood');

@@ -1,11 +1,15 @@
 // The resolution, and the share of the Gaussians, that a device has time for.
-// In: how long pictures take. Out: the share of the full side length that the next picture is drawn with, up to 1, and the share of the Gaussians: less
-// while something moves and pictures are slow, more when it rests. At rest all Gaussians are drawn.
+// In: how long pictures take, looked at once a frame. Out: the share of the full side length that the next picture is drawn with, up to 1, and the
+// share of the Gaussians: less while something moves and pictures are slow, more when it rests. At rest all Gaussians are drawn.
 
-// Milliseconds of a picture while something moves: slower ones are made smaller, quicker ones larger.
+// The factor by which a picture gets wider and higher again.
+const LARGER = 1.2;
+// Milliseconds of a picture while something moves: slower ones are made smaller, quicker ones larger. A picture that is there at the next frame is
+// quick, too, if a larger one would not take longer than wanted: a browser that saves power shows a frame in 33 ms.
 const SLOW = 90;
 const AIM = 55;
 const QUICK = 25;
+const QUICK_FRAME = AIM / LARGER ** 2;
 // Milliseconds that a picture of what rests may take, by what the last one took.
 const PATIENT = 2500;
 // Quick pictures in a row before the next is larger; and how much longer after a size that was too large.
@@ -35,11 +39,12 @@ export class Quality {
     return moves ? this.kept : 1;
   }
 
-  // Learns from a picture that was drawn with a share.
-  learn(milliseconds, share, moved) {
+  // Learns from a picture that was drawn with a share. `frame` is the time since the frame before, milliseconds.
+  learn(milliseconds, share, moved, frame) {
     if (moved) {
+      const isQuick = milliseconds <= Math.max(QUICK, Math.min(QUICK_FRAME, frame));
       if (milliseconds > SLOW && share <= this.moving) this.reduce(milliseconds, share);
-      else if (milliseconds < QUICK && (this.kept < 1 || this.moving < 1)) this.restore();
+      else if (isQuick && (this.kept < 1 || this.moving < 1)) this.restore();
       else this.quick = 0;
       this.still = this.moving;
     } else if (share >= this.still) {
@@ -66,8 +71,8 @@ export class Quality {
     this.quick += 1;
     if (this.quick < this.row) return;
     this.quick = 0;
-    if (this.kept < 1) this.kept = Math.min(1, this.kept * 1.2);
-    else this.moving = Math.min(1, this.moving * 1.2);
+    if (this.kept < 1) this.kept = Math.min(1, this.kept * LARGER);
+    else this.moving = Math.min(1, this.moving * LARGER);
   }
 
   // Whether what rests can be drawn better than a picture.

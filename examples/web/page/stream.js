@@ -1,5 +1,6 @@
 // The files of a capture in chunk files: fetched as its player needs them, whole or as parts of one file.
-// In: the player, the number of the capture in it, where the files are, what is played. Out: files in the player; whether there is a picture of a time.
+// In: the player, the number of the capture in it, where the files are, what is played. Out: files in the player; whether there is a picture of a
+// time; an error if the player answers no call any more.
 
 // Milliseconds of a frame in which files are read and uploaded.
 const SLICE = 6;
@@ -56,11 +57,12 @@ export function partsOf(file) {
 export class Stream {
   // `read` gives the bytes of a file by its name, or by its range in the file of the index.
   constructor(player, number, read) {
-    Object.assign(this, { player, number, read, requests: new Map(), told: null });
+    Object.assign(this, { player, number, read, requests: new Map(), told: null, fault: null });
   }
 
   // Asks for the files that the player needs next, and ends requests that it does not need any more.
   follow(seconds, velocity, loops) {
+    if (this.fault) throw this.fault;
     const plan = this.player.plan(this.number, performance.now() / 1000, seconds, velocity, loops);
     if (!plan) return this.end();
     const { fetch, give_up } = plan;
@@ -69,7 +71,8 @@ export class Stream {
       this.requests.get(file)?.abort();
       this.requests.delete(file);
     }
-    for (const file of fetch) this.ask(file);
+    // A request that fails is no fault: the player asks again. A player that has ended takes no answer.
+    for (const file of fetch) this.ask(file).catch((error) => (this.fault = error));
   }
 
   async ask(file) {

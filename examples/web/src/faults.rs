@@ -1,7 +1,7 @@
 //! Faults of the graphics device, which it reports some time after they happened.
 //!
 //! In: a device. Out: [`Faults`], whose first message the page shows; and panics of the program on the console of the
-//! browser.
+//! browser, and as a message for the page.
 
 use std::sync::{Arc, Mutex, PoisonError};
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -37,7 +37,21 @@ impl Faults {
     }
 }
 
-/// Writes the message of a panic to the console.
+/// The message of the first panic.
+static PANIC: Mutex<Option<String>> = Mutex::new(None);
+
+/// Writes the message of a panic to the console, and keeps the first one for [`panic_message`].
 pub fn report_panics() {
-    std::panic::set_hook(Box::new(|panic| error(&panic.to_string())));
+    std::panic::set_hook(Box::new(|panic| {
+        let message = panic.to_string();
+        error(&message);
+        PANIC.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(message);
+    }));
+}
+
+/// Returns the message of the panic that has ended the program, if it was one: without memory it ends without a
+/// message.
+#[wasm_bindgen]
+pub fn panic_message() -> Option<String> {
+    PANIC.lock().unwrap_or_else(PoisonError::into_inner).clone()
 }

@@ -10,6 +10,6 @@ mod opening;
 mod pose;
 
 pub use about::About;
-pub use faults::{Faults, report_panics};
+pub use faults::{Faults, panic_message, report_panics};
 pub use opening::{Opening, OpeningStep};
 pub use pose::view;

@@ -70,7 +70,13 @@ impl Opening {
             return Err("the file has been received".to_owned());
         };
         let has_room = bytes.try_reserve(piece.len());
-        has_room.map_err(|_| format!("{} bytes are more than a page has memory for", bytes.len() + piece.len()))?;
+        has_room.map_err(|_| {
+            format!(
+                "{} bytes are more than a page has memory for: make the capture smaller (gs4d compress), or cut it \
+                 into chunk files (gs4d split), of which the page keeps some",
+                bytes.len() + piece.len()
+            )
+        })?;
         bytes.extend_from_slice(piece);
         Ok(())
     }
