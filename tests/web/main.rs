@@ -194,11 +194,11 @@ fn loading_again_takes_no_further_memory() {
     let memory = seen.value("memory");
     let bytes = memory["bytes"].as_u64().expect("the length of the file");
     let sizes: Vec<u64> = serde_json::from_value(memory["sizes"].clone()).expect("bytes after each capture");
-    // The heap may grow by some pages once: what is freed and allocated in between depends on when pieces of the file
-    // and pictures arrive. If each load kept a sixteenth of the file, those after the second would take twice this.
+    // The heap may grow once, at any load: what is freed and allocated in between depends on when pieces of the file and
+    // pictures arrive. If each load kept a twentieth of the file, those after the second would take more than the file.
     let [_, second, further @ .., last] = &sizes[..] else { panic!("loads after the second: {sizes:?}") };
-    let most = (further.len() as u64 + 1) * bytes / 16 / 2;
-    assert!(last - second < most, "loads after the second take less than {most} bytes: {sizes:?}");
+    assert!(further.len() > 20, "so many loads: {sizes:?}");
+    assert!(last - second < bytes, "loads after the second take less than the {bytes} bytes of the file: {sizes:?}");
 }
 
 /// Checks the values that the page has reported as true.

@@ -94,7 +94,7 @@ async function loading() {
   await post('loading', { slices, draws, pictures, parts: had('progress').length, long: inside.seen.long });
   const bytes = new Uint8Array(await (await fetch('/page/toybox.gs4d')).arrayBuffer());
   const sizes = [];
-  for (let i = 0; i < 10; i++) {
+  for (let i = 0; i < 24; i++) {
     await page.openBytes('toybox.gs4d', bytes.slice());
     sizes.push(page.times.memory());
   }
